@@ -1,0 +1,43 @@
+# Every dependency, found once. All are Debian 12 packages: see scripts/packages.txt and third_party_notes.md.
+include(CMakePackageConfigHelpers)
+include(GNUInstallDirs)
+
+list(APPEND CMAKE_MODULE_PATH "${CMAKE_CURRENT_LIST_DIR}/modules")
+find_package(Threads REQUIRED)
+find_package(TBB REQUIRED)
+find_package(PkgConfig REQUIRED)
+find_package(yaml-cpp REQUIRED)
+find_package(spdlog REQUIRED)
+pkg_check_modules(EIGEN3 REQUIRED IMPORTED_TARGET eigen3)
+pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
+pkg_check_modules(SPNG REQUIRED IMPORTED_TARGET spng)
+pkg_check_modules(TURBOJPEG REQUIRED IMPORTED_TARGET libturbojpeg)
+pkg_check_modules(DEFLATE REQUIRED IMPORTED_TARGET libdeflate)
+pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
+
+# OpenVDB ships a find module instead of a config file.
+if(NOT TARGET OpenVDB::openvdb)
+  find_path(FELTMAP_OPENVDB_MODULE FindOpenVDB.cmake
+            PATHS /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB /usr/lib/cmake/OpenVDB REQUIRED)
+  list(APPEND CMAKE_MODULE_PATH "${FELTMAP_OPENVDB_MODULE}")
+  find_package(OpenVDB 10 REQUIRED COMPONENTS openvdb)
+endif()
+
+# Debian's OpenCVConfig names every module that was built; these three are all we link.
+foreach(module core imgproc imgcodecs)
+  find_library(FELTMAP_OPENCV_${module} opencv_${module} REQUIRED)
+endforeach()
+find_path(FELTMAP_OPENCV_INCLUDE opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
+if(NOT TARGET felt_opencv)
+  add_library(felt_opencv INTERFACE)
+  target_include_directories(felt_opencv SYSTEM INTERFACE "$<BUILD_INTERFACE:${FELTMAP_OPENCV_INCLUDE}>")
+  target_link_libraries(felt_opencv INTERFACE ${FELTMAP_OPENCV_imgcodecs} ${FELTMAP_OPENCV_imgproc} ${FELTMAP_OPENCV_core})
+endif()
+
+find_program(CCACHE ccache)
+if(CCACHE AND PROJECT_IS_TOP_LEVEL AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  # The sloppiness is what ccache's manual asks for with precompiled headers.
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime
+      CCACHE_BASEDIR=${PROJECT_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${CCACHE})
+endif()
+find_program(MOLD mold)

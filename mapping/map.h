@@ -1,0 +1,41 @@
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <cstdint>
+#include <string>
+
+#include "core/class_table.h"
+#include "mapping/block_store.h"
+
+namespace felt {
+
+/// A map: plain data. Index (i, j, k) is the voxel centre at index * voxel_size_m, world frame, metres.
+struct Map {
+  Map(double voxel_size_m_, double truncation_m_)
+      : voxel_size_m(voxel_size_m_), truncation_m(truncation_m_), store(float(truncation_m_)) {}
+
+  double voxel_size_m;
+  double truncation_m;
+  BlockStore store;
+  ClassTable classes;  ///< empty: a map without semantics
+};
+
+/// Trilinear sample of the signed distance at a world point, metres; NaN where one of the eight voxels around it was
+/// never observed (weight < min_weight).
+float sample_tsdf(const Map& map, double x, double y, double z, float min_weight = 1e-6f);
+
+/// Number of voxels with weight > 0.
+size_t active_voxel_count(const Map& map);
+
+/// Hash (XXH3, 128 bits, hex) of every stored value and its coordinate in canonical order: equal for equal maps, whatever
+/// the number of threads, the order of block creation, or the layout of a file. Blocks that hold nothing do not count.
+std::string map_hash(const Map& map);
+
+/// Stock OpenVDB views of the map. `tsdf` is a level set in metres with background = truncation; voxels are active where
+/// weight > 0, and both grids have the same topology.
+openvdb::FloatGrid::Ptr tsdf_grid(const Map& map);
+openvdb::FloatGrid::Ptr weight_grid(const Map& map);
+openvdb::Vec3SGrid::Ptr color_grid(const Map& map);  ///< in [0, 1]
+
+}  // namespace felt
