@@ -11,15 +11,15 @@ namespace felt {
 
 /// One row of `classes.yaml`.
 struct ClassInfo {
-  uint16_t id = 0;      ///< value in label images
+  uint16_t id = 0;  ///< value in label images
   std::string name;
   Rgba8 color;          ///< of views and meshes
   bool ignore = false;  ///< its pixels carry no label
   bool operator==(const ClassInfo&) const = default;
 };
 
-/// The classes of a map. A class's *slot* is its position among the classes that are not ignored: 0 .. k-1, the index of
-/// every Dirichlet and property vector.
+/// The classes of a map. A class's *slot* is its position among the classes that are not ignored: 0 .. k-1, the index
+/// of every Dirichlet and property vector.
 class ClassTable {
 public:
   static constexpr uint16_t kNoSlot = 0xffff;

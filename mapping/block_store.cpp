@@ -11,6 +11,10 @@ struct BlockStore::Guard {
   std::mutex mutex;
 };
 
+bool GeometryPlanes::observed() const {
+  return std::any_of(std::begin(weight), std::end(weight), [](float w) { return w > 0; });
+}
+
 std::shared_ptr<BlockStore::Guard> BlockStore::make_guard() { return std::make_shared<Guard>(); }
 
 uint32_t BlockStore::find(const BlockCoord& coord) const {

@@ -13,6 +13,9 @@ namespace felt {
 struct alignas(64) GeometryPlanes {
   float tsdf[kBlockVoxels];    ///< metres, positive in front of the surface; the truncation where weight is 0
   float weight[kBlockVoxels];  ///< sum of observation weights, 0: never observed
+
+  /// Whether any voxel was observed. A block that holds nothing is not part of the map.
+  bool observed() const;
 };
 
 /// Running averages of colour, in 1/256 grey levels, and the number of observations (saturating), 4 KiB.
@@ -41,8 +44,8 @@ struct Block {
 };
 
 /// Owner of every plane of a map, indexed by block coordinates. Blocks keep their number (order of creation) and their
-/// planes keep their address until `clear`. Topology changes (`find_or_create`, `add_*`) are serial; the values of distinct blocks may be
-/// written in parallel.
+/// planes keep their address until `clear`. Topology changes (`find_or_create`, `add_*`) are serial; the values of
+/// distinct blocks may be written in parallel.
 class BlockStore {
 public:
   static constexpr uint32_t kNone = 0xffffffff;
@@ -65,7 +68,8 @@ public:
   uint32_t find_or_create(const BlockCoord& coord);
   /// The colour planes of a block, created where absent. Not thread-safe.
   ColorPlanes& add_color(Block& block);
-  /// A plane of zeros that lives as long as the store. Thread-safe, so that the one task of a block can add what it needs.
+  /// A plane of zeros that lives as long as the store. Thread-safe, so that the one task of a block can add what it
+  /// needs.
   Plane* new_plane();
   /// Block numbers in ascending order of coordinates: the canonical order of every output.
   std::vector<uint32_t> sorted() const;

@@ -9,37 +9,6 @@
 #include <limits>
 
 namespace felt {
-namespace {
-
-openvdb::Coord first_coord(const BlockCoord& c) { return {c.x * 8, c.y * 8, c.z * 8}; }
-
-bool observed(const GeometryPlanes& g) {
-  for (const float w : g.weight)
-    if (w > 0) return true;
-  return false;
-}
-
-/// One leaf per observed block, active where weight > 0; `write` fills the 512 values.
-template <typename Grid, typename Write>
-typename Grid::Ptr make_grid(const Map& map, const char* name, typename Grid::ValueType background, Write write) {
-  openvdb::initialize();
-  auto grid = Grid::create(background);
-  grid->setName(name);
-  grid->setTransform(openvdb::math::Transform::createLinearTransform(map.voxel_size_m));
-  for (const Block& block : map.store.blocks()) {
-    if (!observed(*block.geometry)) continue;
-    using Leaf = typename Grid::TreeType::LeafNodeType;
-    auto leaf = std::make_unique<Leaf>(first_coord(block.coord), background);
-    write(block, leaf->buffer().data());
-    for (int i = 0; i < kBlockVoxels; ++i)
-      if (block.geometry->weight[i] > 0) leaf->setValueOn(i);
-    grid->tree().addLeaf(leaf.release());
-  }
-  return grid;
-}
-
-}  // namespace
-
 size_t active_voxel_count(const Map& map) {
   size_t n = 0;
   for (const Block& block : map.store.blocks())
@@ -54,7 +23,7 @@ std::string map_hash(const Map& map) {
   std::vector<uint8_t> holds(order.size(), 0);
   tbb::parallel_for(size_t(0), order.size(), [&](size_t n) {
     const Block& block = map.store[order[n]];
-    if (!observed(*block.geometry)) return;
+    if (!block.geometry->observed()) return;
     holds[n] = 1;
     XXH3_state_t state;
     XXH3_INITSTATE(&state);
@@ -92,35 +61,11 @@ float sample_tsdf(const Map& map, double x, double y, double z, float min_weight
     const Index3 v{base.x + dx, base.y + dy, base.z + dz};
     const Block* block = map.store.get(block_of_voxel(v));
     const int offset = offset_in_block(v);
-    if (block == nullptr || block->geometry->weight[offset] < min_weight) return std::numeric_limits<float>::quiet_NaN();
+    if (block == nullptr || block->geometry->weight[offset] < min_weight)
+      return std::numeric_limits<float>::quiet_NaN();
     sum += (dx ? fx : 1 - fx) * (dy ? fy : 1 - fy) * (dz ? fz : 1 - fz) * block->geometry->tsdf[offset];
   }
   return float(sum);
-}
-
-openvdb::FloatGrid::Ptr tsdf_grid(const Map& map) {
-  auto grid = make_grid<openvdb::FloatGrid>(map, "tsdf", float(map.truncation_m), [](const Block& b, float* out) {
-    std::copy_n(b.geometry->tsdf, kBlockVoxels, out);
-  });
-  grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  return grid;
-}
-
-openvdb::FloatGrid::Ptr weight_grid(const Map& map) {
-  return make_grid<openvdb::FloatGrid>(map, "weight", 0.0f, [](const Block& b, float* out) {
-    std::copy_n(b.geometry->weight, kBlockVoxels, out);
-  });
-}
-
-openvdb::Vec3SGrid::Ptr color_grid(const Map& map) {
-  auto grid = make_grid<openvdb::Vec3SGrid>(map, "color", openvdb::Vec3s(0.0f), [](const Block& b, openvdb::Vec3s* out) {
-    if (b.color == nullptr) return;
-    constexpr float kScale = 1.0f / (255 * 256);
-    for (int i = 0; i < kBlockVoxels; ++i)
-      out[i] = openvdb::Vec3s(b.color->r[i] * kScale, b.color->g[i] * kScale, b.color->b[i] * kScale);
-  });
-  grid->setVectorType(openvdb::VEC_INVARIANT);
-  return grid;
 }
 
 }  // namespace felt

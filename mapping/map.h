@@ -1,7 +1,5 @@
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <cstdint>
 #include <string>
 
@@ -28,14 +26,9 @@ float sample_tsdf(const Map& map, double x, double y, double z, float min_weight
 /// Number of voxels with weight > 0.
 size_t active_voxel_count(const Map& map);
 
-/// Hash (XXH3, 128 bits, hex) of every stored value and its coordinate in canonical order: equal for equal maps, whatever
-/// the number of threads, the order of block creation, or the layout of a file. Blocks that hold nothing do not count.
+/// Hash (XXH3, 128 bits, hex) of every stored value and its coordinate in canonical order: equal for equal maps,
+/// whatever the number of threads, the order of block creation, or the layout of a file. Blocks that hold nothing do
+/// not count.
 std::string map_hash(const Map& map);
-
-/// Stock OpenVDB views of the map. `tsdf` is a level set in metres with background = truncation; voxels are active where
-/// weight > 0, and both grids have the same topology.
-openvdb::FloatGrid::Ptr tsdf_grid(const Map& map);
-openvdb::FloatGrid::Ptr weight_grid(const Map& map);
-openvdb::Vec3SGrid::Ptr color_grid(const Map& map);  ///< in [0, 1]
 
 }  // namespace felt

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "mapping/map.h"
+#include "mapping/vdb_views.h"
 
 using namespace felt;
 
