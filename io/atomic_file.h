@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string_view>
+
+namespace felt {
+
+/// A file that appears whole or not at all. It is written beside its destination under a name that ends in the same
+/// extension; `commit` flushes it to the disk and renames it over the destination, and destruction without `commit`
+/// removes it, so that an older file stays intact until the new one is whole.
+///
+/// Write with `write`, or hand `path()` to a library that opens files itself (both at once would overwrite each other).
+/// Every member throws IoError with the destination, the step that failed and the system's reason ("No space left on
+/// device").
+class AtomicFile {
+public:
+  /// Creates the temporary file. The folder must exist; a destination that is a folder or a device is refused, and
+  /// through a symbolic link the file it names is replaced.
+  explicit AtomicFile(const std::filesystem::path& destination);
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+
+  /// The temporary file.
+  const std::filesystem::path& path() const { return temporary_; }
+  /// Appends bytes, unbuffered: pass large pieces.
+  void write(const void* data, size_t bytes);
+  void write(std::string_view text) { write(text.data(), text.size()); }
+  /// fsync, rename, fsync of the folder. At most once.
+  void commit();
+
+private:
+  [[noreturn]] void fail(const char* step, int error) const;
+
+  std::filesystem::path shown_, destination_, temporary_;
+  int descriptor_ = -1;
+};
+
+/// Replaces the content of `destination` by `bytes` in one step.
+void write_file_atomically(const std::filesystem::path& destination, std::string_view bytes);
+
+}  // namespace felt
