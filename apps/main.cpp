@@ -1,6 +1,60 @@
+#include <CLI/CLI.hpp>
 #include <cstdio>
+#include <exception>
+#include <new>
+#include <sstream>
+#include <string>
 
-int main() {
-  std::printf("feltmap %s\n", FELTMAP_VERSION);
-  return 0;
+#include "apps/commands.h"
+#include "apps/exit_code.h"
+#include "core/error.h"
+
+namespace felt::apps {
+namespace {
+
+/// Each line of the message on stderr under the program's name.
+int fail(ExitCode code, const std::string& message) {
+  std::istringstream lines(message);
+  for (std::string line; std::getline(lines, line);) std::fprintf(stderr, "feltmap: error: %s\n", line.c_str());
+  return code;
+}
+
+void add_commands(CLI::App& app) {
+  app.require_subcommand(1);
+  app.set_version_flag("--version", [] { return std::string("feltmap " FELTMAP_VERSION); });
+  app.footer("Each command explains itself, with an example: feltmap <command> --help");
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Dense volumetric mapping that knows what things are and how they feel", "feltmap");
+  add_commands(app);
+  try {
+    app.parse(argc, argv);
+    return kDone;
+  } catch (const CLI::RuntimeError& e) {
+    return e.get_exit_code();
+  } catch (const CLI::Success& e) {
+    return app.exit(e);  // --help, --version
+  } catch (const CLI::ParseError& e) {
+    return fail(kUsage, std::string(e.what()) + " (see feltmap --help)");
+  }
+}
+
+}  // namespace
+}  // namespace felt::apps
+
+/// The only place that turns errors into exit codes.
+int main(int argc, char** argv) {
+  using namespace felt::apps;
+  try {
+    return run(argc, argv);
+  } catch (const felt::ConfigError& e) {
+    return fail(kConfiguration, e.what());
+  } catch (const felt::Error& e) {
+    return fail(kInputOutput, e.what());
+  } catch (const std::bad_alloc&) {
+    return fail(kInternal, "out of memory");
+  } catch (const std::exception& e) {
+    return fail(kInternal, e.what());
+  }
 }

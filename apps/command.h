@@ -1,0 +1,32 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+namespace felt::apps {
+
+/// Options that every command takes.
+struct CommonOptions {
+  bool quiet = false;              ///< no progress bar, no closing summary
+  bool json = false;               ///< one JSON document on stdout and nothing else there
+  int threads = 0;                 ///< 0: all hardware threads
+  std::string log_level = "warn";  ///< of messages on stderr
+
+  /// Threads that the command runs on: `threads`, or what the machine has.
+  int thread_count() const;
+};
+
+/// What a command is made of besides its own options.
+struct CommandText {
+  std::string name;
+  std::string description;  ///< one sentence
+  std::string example;      ///< complete command lines, one a line, shown at the end of the help
+};
+
+/// Adds a subcommand with the common options bound to `common`. When it is chosen and its options are valid, logging
+/// and the number of threads are set up and `run` is called; its return value is the exit code. Errors leave `run` as
+/// exceptions (core/error.h).
+CLI::App& add_command(CLI::App& app, const CommandText& text, CommonOptions& common, std::function<int()> run);
+
+}  // namespace felt::apps

@@ -1,0 +1,35 @@
+#include "apps/interrupt.h"
+
+#include <csignal>
+
+namespace felt::apps {
+namespace {
+
+volatile std::sig_atomic_t signal_seen = 0;
+struct sigaction previous_int, previous_term;
+
+extern "C" void on_signal(int number) {
+  signal_seen = 1;
+  std::signal(number, SIG_DFL);
+}
+
+}  // namespace
+
+InterruptGuard::InterruptGuard() {
+  signal_seen = 0;
+  struct sigaction action = {};
+  action.sa_handler = on_signal;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, &previous_int);
+  sigaction(SIGTERM, &action, &previous_term);
+}
+
+InterruptGuard::~InterruptGuard() {
+  sigaction(SIGINT, &previous_int, nullptr);
+  sigaction(SIGTERM, &previous_term, nullptr);
+}
+
+bool InterruptGuard::requested() const { return signal_seen != 0; }
+
+}  // namespace felt::apps

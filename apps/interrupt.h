@@ -1,0 +1,17 @@
+#pragma once
+
+namespace felt::apps {
+
+/// From construction to destruction SIGINT and SIGTERM set a flag instead of ending the process, so that a command can
+/// save what it has. A second signal ends the process at once. One object at a time.
+class InterruptGuard {
+public:
+  InterruptGuard();
+  ~InterruptGuard();
+  InterruptGuard(const InterruptGuard&) = delete;
+  InterruptGuard& operator=(const InterruptGuard&) = delete;
+
+  bool requested() const;
+};
+
+}  // namespace felt::apps

@@ -1,0 +1,26 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+
+#include "tests/cli/command.h"
+
+namespace felt::test {
+
+TEST_CASE("the version is printed on stdout") {
+  const CommandResult result = run_feltmap("--version");
+  CHECK(result.exit_code == 0);
+  CHECK_THAT(result.out, Catch::Matchers::Matches("feltmap [0-9]+\\.[0-9]+\\.[0-9]+[^\n]*\n"));
+  CHECK(result.err.empty());
+}
+
+TEST_CASE("a command line that makes no sense exits with 2 and one line on stderr") {
+  for (const char* arguments : {"", "no-such-command", "--no-such-option"}) {
+    INFO("feltmap " << arguments);
+    const CommandResult result = run_feltmap(arguments);
+    CHECK(result.exit_code == 2);
+    CHECK(result.out.empty());
+    CHECK_THAT(result.err, Catch::Matchers::StartsWith("feltmap: error: "));
+    CHECK(std::count(result.err.begin(), result.err.end(), '\n') == 1);
+  }
+}
+
+}  // namespace felt::test
