@@ -1,0 +1,33 @@
+#pragma once
+
+namespace felt {
+
+/// What a depth pixel says about the signed distance of a voxel at camera depth z on its ray.
+enum class DistanceModel {
+  optical_axis,   ///< d - z
+  ray,            ///< (d - z) |r|, r = (x/z, y/z, 1): distance along the viewing ray
+  tangent_plane,  ///< (d - z) |n . r|: distance to the plane through the pixel's surface point with its normal n
+};
+
+/// Weight of one observation at depth d (metres), before drop-off.
+enum class WeightModel {
+  constant,        ///< 1
+  inverse_square,  ///< 1 / d^2, 1 at one metre
+  sensor_noise,    ///< (sigma(1 m) / sigma(d))^2, sigma(d) = 1.2 mm + 1.9 mm (d - 0.4)^2: Nguyen, Izadi, Lovell 2012
+                   ///< (Kinect)
+};
+
+/// Settings of depth fusion that do not change between frames.
+struct IntegrationConfig {
+  float min_depth_m = 0.1f;  ///< nearer pixels are not used
+  float max_depth_m = 4.0f;  ///< farther pixels are not used
+  DistanceModel distance = DistanceModel::optical_axis;
+  WeightModel weight = WeightModel::constant;
+  float max_weight = 255.0f;  ///< cap of the summed weight: an old map stays able to change
+  /// Behind the surface the weight falls linearly from 1 at this distance (in voxels) to 0 at the truncation.
+  float dropoff_start_vox = 1.0f;
+  /// Also fuse "free" (+truncation) into observed voxels in front of the band, as far as blocks exist.
+  bool carve = false;
+};
+
+}  // namespace felt

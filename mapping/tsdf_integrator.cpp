@@ -1,0 +1,122 @@
+#include "mapping/tsdf_integrator.h"
+
+#include <tbb/parallel_for.h>
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+
+namespace felt {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// Per-pixel factor of (d - z), or null for the optical axis.
+const float* depth_scale(const Frame& frame, const IntegrationConfig& config, IntegrationScratch& scratch) {
+  const PinholeCamera& camera = frame.camera;
+  const int width = frame.depth_m.width(), height = frame.depth_m.height();
+  if (config.distance == DistanceModel::optical_axis) return nullptr;
+  if (config.distance == DistanceModel::ray) {
+    if (scratch.depth_scale_camera == camera && !scratch.depth_scale.empty()) return scratch.depth_scale.data();
+    scratch.depth_scale.resize(size_t(width) * height);
+    for (int v = 0; v < height; ++v)
+      for (int u = 0; u < width; ++u) scratch.depth_scale[size_t(v) * width + u] = float(camera.ray(u, v).norm());
+    scratch.depth_scale_camera = camera;
+    return scratch.depth_scale.data();
+  }
+  scratch.depth_scale.resize(size_t(width) * height);
+  scratch.depth_scale_camera = {};
+  // Neighbours farther off than a surface seen at 80 degrees would be are another surface's.
+  constexpr float kSteepest = 5.67f;
+  const SlopeView view{.depth_m = frame.depth_m.data(),
+                       .width = width,
+                       .height = height,
+                       .fx = float(camera.fx),
+                       .fy = float(camera.fy),
+                       .cx = float(camera.cx),
+                       .cy = float(camera.cy),
+                       .max_step = kSteepest / float(std::min(camera.fx, camera.fy))};
+  tbb::parallel_for(tbb::blocked_range<int>(0, height, 32), [&](const tbb::blocked_range<int>& rows) {
+    for (int v = rows.begin(); v < rows.end(); ++v)
+      tangent_scale_row(view, v, scratch.depth_scale.data() + size_t(v) * width);
+  });
+  return scratch.depth_scale.data();
+}
+
+/// Finds or creates the blocks, with the planes that this frame writes: the only serial step.
+size_t allocate_blocks(Map& map, const std::vector<BlockCoord>& coords, bool with_color,
+                       std::vector<uint32_t>& blocks) {
+  const size_t before = map.store.size();
+  blocks.clear();
+  blocks.reserve(coords.size());
+  for (const BlockCoord& coord : coords) {
+    blocks.push_back(map.store.find_or_create(coord));
+    if (with_color) map.store.add_color(map.store[blocks.back()]);
+  }
+  return map.store.size() - before;
+}
+
+}  // namespace
+
+DepthView depth_view(const Frame& frame, const IntegrationConfig& config, const Map& map, const float* scale) {
+  DepthView view;
+  view.depth_m = frame.depth_m.data();
+  view.scale = scale;
+  view.width = frame.depth_m.width(), view.height = frame.depth_m.height();
+  const PinholeCamera& camera = frame.camera;
+  Eigen::Matrix3d K;
+  K << camera.fx, 0, camera.cx + 0.5, 0, camera.fy, camera.cy + 0.5, 0, 0, 1;
+  const Eigen::Isometry3d T_camera_world = frame.T_world_camera.inverse();
+  const Eigen::Matrix3d per_voxel = K * T_camera_world.linear() * map.voxel_size_m;
+  const Eigen::Vector3d at_origin = K * T_camera_world.translation();
+  for (int c = 0; c < 3; ++c) {
+    for (int axis = 0; axis < 3; ++axis) view.first[c][axis] = per_voxel(c, axis);
+    view.first[c][3] = at_origin[c];
+    view.step_x[c] = float(per_voxel(c, 0));
+    for (int y = 0; y < 8; ++y)
+      for (int z = 0; z < 8; ++z) view.plane[c][y * 8 + z] = float(per_voxel(c, 1) * y + per_voxel(c, 2) * z);
+  }
+  view.min_depth_m = config.min_depth_m, view.max_depth_m = config.max_depth_m;
+  view.truncation_m = float(map.truncation_m);
+  const double dropoff_start = std::min(double(config.dropoff_start_vox) * map.voxel_size_m, 0.99 * map.truncation_m);
+  view.dropoff_start_m = float(dropoff_start);
+  view.dropoff_slope = float(1 / (map.truncation_m - dropoff_start));
+  view.weight = config.weight;
+  view.max_weight = config.max_weight;
+  view.carve = config.carve;
+  return view;
+}
+
+FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& config, IntegrationScratch& scratch) {
+  FrameStats stats;
+  const auto start = Clock::now();
+  const std::vector<BlockCoord> coords =
+      blocks_in_view(frame.depth_m, frame.camera, frame.T_world_camera, map.voxel_size_m, map.truncation_m,
+                     config.min_depth_m, config.max_depth_m, scratch.allocation);
+  stats.blocks_created = allocate_blocks(map, coords, !frame.color.empty(), scratch.blocks);
+  stats.blocks_in_view = coords.size();
+  stats.allocate_s = seconds_since(start);
+
+  const auto fusing = Clock::now();
+  const DepthView view = depth_view(frame, config, map, depth_scale(frame, config, scratch));
+  const auto* rgba = reinterpret_cast<const uint32_t*>(frame.color.data());
+  std::atomic<size_t> updated{0};
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, coords.size(), 16), [&](const tbb::blocked_range<size_t>& range) {
+    BlockObservation observation;
+    size_t observed = 0;
+    for (size_t n = range.begin(); n < range.end(); ++n) {
+      Block& block = map.store[scratch.blocks[n]];
+      if (!observe_block(coords[n], view, observation)) continue;
+      ++observed;
+      fuse_tsdf(observation, view.max_weight, *block.geometry);
+      if (block.color != nullptr && rgba != nullptr) fuse_color(observation, rgba, view.truncation_m, *block.color);
+    }
+    updated.fetch_add(observed, std::memory_order_relaxed);
+  });
+  stats.blocks_updated = updated;
+  stats.fuse_s = seconds_since(fusing);
+  return stats;
+}
+
+}  // namespace felt

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <vector>
+
+#include "core/frame.h"
+#include "mapping/block_allocation.h"
+#include "mapping/integration_config.h"
+#include "mapping/map.h"
+#include "mapping/tsdf_kernels.h"
+
+namespace felt {
+
+/// What fusing one frame did.
+struct FrameStats {
+  size_t blocks_in_view = 0;  ///< blocks near the measured surface
+  size_t blocks_created = 0;
+  size_t blocks_updated = 0;  ///< blocks with at least one observed voxel
+  double allocate_s = 0;      ///< finding and creating blocks
+  double fuse_s = 0;          ///< updating every channel
+};
+
+/// Working memory of `integrate`, reused from frame to frame.
+struct IntegrationScratch {
+  AllocationScratch allocation;
+  std::vector<uint32_t> blocks;
+  std::vector<float> depth_scale;    ///< per pixel factor of the distance model
+  PinholeCamera depth_scale_camera;  ///< of the cached ray lengths
+};
+
+/// Fuses one frame: the frame loop of the engine. Bit-identical for any number of threads (each block is written by one
+/// task) and for every SIMD target. Non-finite and out-of-range depth is ignored.
+FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& config, IntegrationScratch& scratch);
+
+/// The frame as the kernels see it. `scale` as in DepthView.
+DepthView depth_view(const Frame& frame, const IntegrationConfig& config, const Map& map, const float* scale);
+
+}  // namespace felt
