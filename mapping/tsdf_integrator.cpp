@@ -36,6 +36,7 @@ const float* depth_scale(const Frame& frame, const IntegrationConfig& config, In
                        .fy = float(camera.fy),
                        .cx = float(camera.cx),
                        .cy = float(camera.cy),
+                       .max_depth_m = config.max_depth_m,
                        .max_step = kSteepest / float(std::min(camera.fx, camera.fy))};
   tbb::parallel_for(tbb::blocked_range<int>(0, height, 32), [&](const tbb::blocked_range<int>& rows) {
     for (int v = rows.begin(); v < rows.end(); ++v)

@@ -88,11 +88,12 @@ void mark_cells_in_row_scalar(const AllocationView& view, int v, uint8_t* cells)
 
 /// scale[v * width + u] = |n . r| of DistanceModel::tangent_plane for row v, from central differences of the depth:
 /// with slopes zu, zv per pixel, n is proportional to (-fx zu, -fy zv, z + fx zu rx + fy zv ry) and n . r to z. 0 where
-/// a neighbour is missing or farther off than `max_step` times the depth.
+/// a neighbour is missing, or farther off than `max_step` times the depth.
 struct SlopeView {
   const float* depth_m = nullptr;
   int width = 0, height = 0;
   float fx = 0, fy = 0, cx = 0, cy = 0;
+  float max_depth_m = 0;  ///< farther pixels are not used
   float max_step = 0;
 };
 void tangent_scale_row(const SlopeView& view, int v, float* scale_row) noexcept;

@@ -128,8 +128,8 @@ void tangent_scale_row_scalar(const SlopeView& view, int v, float* scale_row) no
     const float z = row[u], left = row[u - 1], right = row[u + 1], up = row[u - view.width], down = row[u + view.width];
     const float limit = view.max_step * z;
     // Comparisons with NaN are false, so a missing or invalid neighbour fails here as well.
-    const bool smooth = z > 0 && std::fabs(left - z) <= limit && std::fabs(right - z) <= limit &&
-                        std::fabs(up - z) <= limit && std::fabs(down - z) <= limit;
+    const bool smooth = z > 0 && z <= view.max_depth_m && std::fabs(left - z) <= limit &&
+                        std::fabs(right - z) <= limit && std::fabs(up - z) <= limit && std::fabs(down - z) <= limit;
     const float su = half_fx * (right - left), sv = half_fy * (down - up);
     const float rx = (float(u) - view.cx) * inverse_fx;
     const float nz = z + su * rx + sv * ry;

@@ -186,11 +186,11 @@ void mark_cells_in_row(const AllocationView& view, int v, uint8_t* cells) {
   const float* row = view.depth_m + size_t(v) * view.width;
   const FloatVec zero = hn::Zero(kF);
   const FloatVec nearest = hn::Set(kF, view.min_depth_m), farthest = hn::Set(kF, view.max_depth_m);
-  const auto last = hn::Set(kI, view.width - 1);
+  const auto width = hn::Set(kI, view.width), last = hn::Set(kI, view.width - 1);
   alignas(64) int32_t index[16];
   for (int u0 = 0; u0 < view.width; u0 += lanes * view.stride) {
     const auto u = hn::Add(hn::Mul(hn::Iota(kI, 0), hn::Set(kI, view.stride)), hn::Set(kI, u0));
-    const auto in_row = hn::RebindMask(kF, hn::Le(u, last));
+    const auto in_row = hn::RebindMask(kF, hn::Lt(u, width));
     const FloatVec d = hn::GatherIndex(kF, row, hn::Min(u, last));
     const FloatMask usable = hn::And(in_row, hn::And(hn::Ge(d, nearest), hn::Le(d, farthest)));
     if (hn::AllFalse(kF, usable)) continue;
@@ -229,7 +229,7 @@ void tangent_scale_row(const SlopeView& view, int v, float* scale_row) {
   const FloatVec ry = hn::Set(kF, (float(v) - view.cy) / view.fy);
   const FloatVec half_fx = hn::Set(kF, 0.5f * view.fx), half_fy = hn::Set(kF, 0.5f * view.fy);
   const FloatVec inverse_fx = hn::Set(kF, 1.0f / view.fx), cx = hn::Set(kF, view.cx);
-  const FloatVec max_step = hn::Set(kF, view.max_step);
+  const FloatVec max_step = hn::Set(kF, view.max_step), farthest = hn::Set(kF, view.max_depth_m);
   const auto near_z = [&](FloatVec other, FloatVec z, FloatVec limit) {
     return hn::Le(hn::Abs(hn::Sub(other, z)), limit);
   };
@@ -241,8 +241,10 @@ void tangent_scale_row(const SlopeView& view, int v, float* scale_row) {
     const FloatVec left = hn::LoadU(kF, row + at - 1), right = hn::LoadU(kF, row + at + 1);
     const FloatVec up = hn::LoadU(kF, row + at - view.width), down = hn::LoadU(kF, row + at + view.width);
     const FloatVec limit = hn::Mul(max_step, z);
-    const FloatMask smooth = hn::And(hn::And(hn::Gt(z, zero), hn::And(near_z(left, z, limit), near_z(right, z, limit))),
-                                     hn::And(near_z(up, z, limit), near_z(down, z, limit)));
+    const FloatMask usable = hn::And(hn::Gt(z, zero), hn::Le(z, farthest));
+    const FloatMask level = hn::And(near_z(left, z, limit), near_z(right, z, limit));
+    const FloatMask upright = hn::And(near_z(up, z, limit), near_z(down, z, limit));
+    const FloatMask smooth = hn::And(usable, hn::And(level, upright));
     const FloatVec su = hn::Mul(half_fx, hn::Sub(right, left)), sv = hn::Mul(half_fy, hn::Sub(down, up));
     const FloatVec uf = hn::ConvertTo(kF, hn::Iota(kI, at));
     const FloatVec rx = hn::Mul(hn::Sub(uf, cx), inverse_fx);
