@@ -1,0 +1,223 @@
+#include "inference/noise.h"
+
+#include <algorithm>
+#include <boost/math/quadrature/gauss.hpp>
+#include <boost/math/special_functions/gamma.hpp>
+#include <cassert>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "inference/special_functions.h"
+
+namespace felt {
+namespace {
+
+using Rule = boost::math::quadrature::gauss<double, 20>;
+
+// Panels whose integrand stays below e^-kNegligible of the largest are left out.
+constexpr double kNegligible = 45.0;
+
+// One class, several noisy readings, as a function of t = ln(lambda / (beta/gamma)).
+class PrecisionPosterior {
+public:
+  PrecisionPosterior(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd, double rho)
+      : prior_(prior), psi_(psi), noise_sd_(noise_sd), rho_(rho), plug_in_precision_(prior.beta / prior.gamma) {
+    // Gamma(lambda; beta, gamma) d lambda = exp(constant + beta (t - e^t)) dt
+    log_normaliser_ = prior.beta * std::log(prior.beta) - boost::math::lgamma(prior.beta) -
+                      0.5 * double(psi.size()) * std::log(2 * std::numbers::pi);
+  }
+
+  // Moments of mu and of the region's own mean given lambda, all about the prior location.
+  struct Given {
+    double log_density = 0;  // ln of prior density times likelihood, per unit of t
+    double lambda = 0;
+    double mean_shift = 0;     // E[mu] - tau
+    double mean_variance = 0;  // Var[mu]
+    double region_shift = 0;   // E[region's mean] - tau
+    double region_variance = 0;
+  };
+
+  Given at(double t) const {
+    Given g;
+    g.lambda = plug_in_precision_ * std::exp(t);
+    const double sigma2 = 1 / g.lambda;
+    double precision = 0, weighted = 0, log_determinant = 0;
+    for (size_t i = 0; i < psi_.size(); ++i) {
+      const double own = (1 - rho_) * sigma2 + noise_sd_[i] * noise_sd_[i];
+      precision += 1 / own;
+      weighted += (psi_[i] - prior_.tau) / own;
+      log_determinant += std::log(own);
+    }
+    const double mean = weighted / precision;
+    double squares = 0;
+    for (size_t i = 0; i < psi_.size(); ++i) {
+      const double d = psi_[i] - prior_.tau - mean;
+      squares += d * d / ((1 - rho_) * sigma2 + noise_sd_[i] * noise_sd_[i]);
+    }
+    const double common = (rho_ + 1 / prior_.kappa) * sigma2;
+    squares += mean * mean * precision / (1 + common * precision);
+    log_determinant += std::log1p(common * precision);
+
+    const double mean_data_variance = rho_ * sigma2 + 1 / precision;
+    g.mean_variance = 1 / (prior_.kappa * g.lambda + 1 / mean_data_variance);
+    g.mean_shift = mean * g.mean_variance / mean_data_variance;
+    g.region_variance = 1 / (1 / common + precision);
+    g.region_shift = mean * g.region_variance * precision;
+    g.log_density = log_normaliser_ + prior_.beta * (t - std::exp(t)) - 0.5 * (log_determinant + squares);
+    return g;
+  }
+
+  // Left of this the density falls towards -infinity, right of `highest_mode` towards +infinity.
+  double lowest_mode() const {
+    double largest = 0;
+    for (size_t i = 0; i < psi_.size(); ++i) {
+      const double d = psi_[i] - prior_.tau;
+      largest = std::max(largest, d * d + noise_sd_[i] * noise_sd_[i]);
+    }
+    return std::min(0.0, -std::log(largest * plug_in_precision_)) - 2;
+  }
+  double highest_mode() const { return std::log1p(double(psi_.size()) / (2 * prior_.beta)); }
+  double natural_width() const { return 1 / std::sqrt(prior_.beta + 0.5 * double(psi_.size())); }
+  double plug_in_precision() const { return plug_in_precision_; }
+
+private:
+  Nig prior_;
+  std::span<const double> psi_, noise_sd_;
+  double rho_, plug_in_precision_, log_normaliser_ = 0;
+};
+
+// Left edges of the panels that matter, all `width` wide, and the largest log density seen.
+struct Panels {
+  std::vector<double> left;
+  double width = 0;
+  double peak = 0;
+};
+
+Panels choose_panels(const PrecisionPosterior& posterior) {
+  const double width = posterior.natural_width();
+  std::vector<double> edge, value;
+  double peak = posterior.at(0).log_density;
+  const auto march = [&](double from, double step, double last_mode) {
+    for (double t = from;; t += step) {
+      const double v = posterior.at(t).log_density;
+      edge.push_back(t);
+      value.push_back(v);
+      peak = std::max(peak, v);
+      if (v < peak - kNegligible && (step < 0 ? t < last_mode : t > last_mode)) break;
+    }
+  };
+  march(-width, -width, posterior.lowest_mode());
+  std::reverse(edge.begin(), edge.end());
+  std::reverse(value.begin(), value.end());
+  march(0, width, posterior.highest_mode());
+  Panels panels{{}, width, peak};
+  for (size_t i = 0; i + 1 < edge.size(); ++i) {
+    if (std::max(value[i], value[i + 1]) > peak - kNegligible) panels.left.push_back(edge[i]);
+  }
+  return panels;
+}
+
+// Calls f(weight, given) at every node; weights are scaled by e^-peak.
+template <class F>
+void for_each_node(const PrecisionPosterior& posterior, const Panels& panels, F f) {
+  const double half = panels.width / 2;
+  for (double left : panels.left) {
+    for (size_t i = 0; i < Rule::abscissa().size(); ++i) {
+      for (double side : {-1.0, 1.0}) {
+        const auto given = posterior.at(left + half + side * half * Rule::abscissa()[i]);
+        f(half * Rule::weights()[i] * std::exp(given.log_density - panels.peak), given);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+MaterialClass tempered_material_class(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd,
+                                      double rho) {
+  assert(!psi.empty() && psi.size() == noise_sd.size());
+  // Noise in units of the class's variance leaves the model conjugate: psi_i has variance sigma^2 (1-rho)/w_i of its
+  // own.
+  const double v = plug_in_variance(prior), within = 1 - rho, n = double(psi.size());
+  double weight = 0, mean = 0, log_weights = 0;
+  for (size_t i = 0; i < psi.size(); ++i) {
+    const double w = within * v / (within * v + noise_sd[i] * noise_sd[i]);
+    weight += w;
+    mean += (psi[i] - prior.tau - mean) * w / weight;
+    log_weights += std::log(w);
+  }
+  double squares = 0, class_squares = 0;  // the latter: only the share of each square that the class explains
+  for (size_t i = 0; i < psi.size(); ++i) {
+    const double w = within * v / (within * v + noise_sd[i] * noise_sd[i]);
+    const double d = psi[i] - prior.tau - mean;
+    squares += w * d * d / within;
+    class_squares += w * w * d * d / within;
+  }
+  const double n_effective = weight / (within + weight * rho);
+  const double mean_share = n_effective * (1 + (n - 1) * rho) / n;  // of the mean's variance, the class's part
+  const double kappa = prior.kappa + n_effective;
+  const double mean_square = prior.kappa * n_effective * mean * mean / kappa;
+
+  MaterialClass result;
+  result.posterior = {prior.tau + n_effective * mean / kappa, kappa,
+                      prior.beta + 0.5 * (weight * (n - 1) / n + mean_share),
+                      prior.gamma + 0.5 * (class_squares + mean_share * mean_square)};
+  result.log_evidence = log_gamma_difference(prior.beta, n / 2) -
+                        (prior.beta + n / 2) * std::log1p(0.5 * (squares + mean_square) / prior.gamma) -
+                        0.5 * (std::log1p(n_effective / prior.kappa) + n * std::log(within) - log_weights +
+                               std::log1p(rho * weight / within) + n * std::log(2 * std::numbers::pi * prior.gamma));
+  const double common = rho + 1 / prior.kappa, pull = weight * common / (within + weight * common);
+  result.next_here = {prior.tau + pull * mean,
+                      plug_in_variance(result.posterior) * (within + within * common / (within + weight * common)),
+                      2 * result.posterior.beta};
+  return result;
+}
+
+MaterialClass quadrature_material_class(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd,
+                                        double rho) {
+  assert(!psi.empty() && psi.size() == noise_sd.size());
+  const PrecisionPosterior posterior(prior, psi, noise_sd, rho);
+  const Panels panels = choose_panels(posterior);
+  double mass = 0, precision = 0, log_precision = 0, shift = 0, region = 0;
+  for_each_node(posterior, panels, [&](double w, const PrecisionPosterior::Given& g) {
+    mass += w;
+    precision += w * g.lambda;
+    log_precision += w * std::log(g.lambda / posterior.plug_in_precision());
+    shift += w * g.lambda * g.mean_shift;
+    region += w * g.lambda * g.region_shift;
+  });
+  shift /= precision;
+  region /= precision;
+  double inverse_kappa = 0, next_spread = 0;
+  for_each_node(posterior, panels, [&](double w, const PrecisionPosterior::Given& g) {
+    const double d = g.mean_shift - shift, e = g.region_shift - region;
+    inverse_kappa += w * g.lambda * (g.mean_variance + d * d);
+    next_spread += w * g.lambda * (g.region_variance + e * e);
+  });
+  precision /= mass;
+  const double beta =
+      inverse_log_minus_digamma(std::log(precision / posterior.plug_in_precision()) - log_precision / mass);
+  const Nig nig{prior.tau + shift, mass / inverse_kappa, beta, beta / precision};
+  return {panels.peak + std::log(mass),
+          nig,
+          {prior.tau + region, plug_in_variance(nig) * (1 - rho + next_spread / mass), 2 * beta}};
+}
+
+MaterialClass noisy_material_class(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd,
+                                   double rho) {
+  if (psi.empty()) return material_class(prior, ReadingStatistics{}, rho);
+  const double largest = *std::max_element(noise_sd.begin(), noise_sd.end());
+  if (largest == 0) return material_class(prior, statistics_of(psi), rho);
+  const double unshared = plug_in_variance(prior) * (psi.size() == 1 ? 1 : 1 - rho);
+  const auto by = largest * largest > unshared / 3 ? quadrature_material_class : tempered_material_class;
+  return by(prior, psi, noise_sd, rho);
+}
+
+NoisyReading noisy_update(const Nig& prior, double psi, double noise_sd) {
+  if (noise_sd == 0) return {log_evidence(prior, psi), conjugate_update(prior, psi)};
+  const MaterialClass c = noisy_material_class(prior, {&psi, 1}, {&noise_sd, 1}, 0);
+  return {c.log_evidence, c.posterior};
+}
+
+}  // namespace felt
