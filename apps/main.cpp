@@ -8,6 +8,7 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "core/error.h"
+#include "core/simd.h"
 
 namespace felt::apps {
 namespace {
@@ -21,7 +22,7 @@ int fail(ExitCode code, const std::string& message) {
 
 void add_commands(CLI::App& app) {
   app.require_subcommand(1);
-  app.set_version_flag("--version", [] { return std::string("feltmap " FELTMAP_VERSION); });
+  app.set_version_flag("--version", [] { return "feltmap " FELTMAP_VERSION " (SIMD: " + simd_name() + ")"; });
   app.footer("Each command explains itself, with an example: feltmap <command> --help");
 }
 
@@ -47,6 +48,7 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   using namespace felt::apps;
   try {
+    felt::apply_simd_choice();
     return run(argc, argv);
   } catch (const felt::ConfigError& e) {
     return fail(kConfiguration, e.what());

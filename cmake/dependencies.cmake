@@ -1,17 +1,11 @@
-# Every dependency, found once. All are Debian 12 packages: see scripts/packages.txt and third_party_notes.md.
-include(CMakePackageConfigHelpers)
-include(GNUInstallDirs)
-
-list(APPEND CMAKE_MODULE_PATH "${CMAKE_CURRENT_LIST_DIR}/modules")
+# Every library that the project links, found once. Also installed: the package's config file includes it, so that a
+# consumer finds what the project was built with. All are Debian 12 packages: scripts/packages.txt, third_party_notes.md.
 find_package(Threads REQUIRED)
 find_package(TBB REQUIRED)
 find_package(PkgConfig REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(spdlog REQUIRED)
 find_package(nlohmann_json REQUIRED)
-if(FELTMAP_BUILD_APPS)
-  find_package(CLI11 REQUIRED)
-endif()
 pkg_check_modules(EIGEN3 REQUIRED IMPORTED_TARGET eigen3)
 pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
 pkg_check_modules(SPNG REQUIRED IMPORTED_TARGET spng)
@@ -33,15 +27,7 @@ foreach(module core imgproc imgcodecs)
 endforeach()
 find_path(FELTMAP_OPENCV_INCLUDE opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
 if(NOT TARGET felt_opencv)
-  add_library(felt_opencv INTERFACE)
-  target_include_directories(felt_opencv SYSTEM INTERFACE "$<BUILD_INTERFACE:${FELTMAP_OPENCV_INCLUDE}>")
+  add_library(felt_opencv INTERFACE IMPORTED)
+  target_include_directories(felt_opencv SYSTEM INTERFACE "${FELTMAP_OPENCV_INCLUDE}")
   target_link_libraries(felt_opencv INTERFACE ${FELTMAP_OPENCV_imgcodecs} ${FELTMAP_OPENCV_imgproc} ${FELTMAP_OPENCV_core})
 endif()
-
-find_program(CCACHE ccache)
-if(CCACHE AND PROJECT_IS_TOP_LEVEL AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  # The sloppiness is what ccache's manual asks for with precompiled headers.
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros,include_file_mtime,include_file_ctime
-      CCACHE_BASEDIR=${PROJECT_SOURCE_DIR} CCACHE_NOHASHDIR=1 ${CCACHE})
-endif()
-find_program(MOLD mold)

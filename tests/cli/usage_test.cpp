@@ -8,8 +8,18 @@ namespace felt::test {
 TEST_CASE("the version is printed on stdout") {
   const CommandResult result = run_feltmap("--version");
   CHECK(result.exit_code == 0);
-  CHECK_THAT(result.out, Catch::Matchers::Matches("feltmap [0-9]+\\.[0-9]+\\.[0-9]+[^\n]*\n"));
+  CHECK_THAT(result.out, Catch::Matchers::Matches("feltmap [0-9]+\\.[0-9]+\\.[0-9]+ \\(SIMD: [a-z0-9]+\\)\n"));
   CHECK(result.err.empty());
+}
+
+TEST_CASE("the SIMD target can be chosen by the environment, and a wrong one is refused") {
+  REQUIRE(setenv("FELTMAP_SIMD", "scalar", 1) == 0);
+  CHECK_THAT(run_feltmap("--version").out, Catch::Matchers::EndsWith("(SIMD: scalar)\n"));
+  REQUIRE(setenv("FELTMAP_SIMD", "mmx", 1) == 0);
+  const CommandResult wrong = run_feltmap("--version");
+  CHECK(wrong.exit_code == 3);
+  CHECK_THAT(wrong.err, Catch::Matchers::Contains("FELTMAP_SIMD") && Catch::Matchers::Contains("mmx"));
+  REQUIRE(unsetenv("FELTMAP_SIMD") == 0);
 }
 
 TEST_CASE("a command line that makes no sense exits with 2 and one line on stderr") {
