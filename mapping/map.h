@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 
 #include "core/class_table.h"
 #include "mapping/block_store.h"
+#include "mapping/frame_journal.h"
 
 namespace felt {
 
@@ -17,6 +19,9 @@ struct Map {
   double truncation_m;
   BlockStore store;
   ClassTable classes;  ///< empty: a map without semantics
+  FrameJournal frames;
+  /// Text that travels with the map, by key: the configuration as used, where it came from. Not part of `map_hash`.
+  std::map<std::string, std::string> metadata;
 };
 
 /// Trilinear sample of the signed distance at a world point, metres; NaN where one of the eight voxels around it was

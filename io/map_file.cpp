@@ -1,0 +1,135 @@
+#include "io/map_file.h"
+
+#include <openvdb/openvdb.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <vector>
+
+#include "core/error.h"
+#include "io/atomic_file.h"
+#include "io/map_metadata.h"
+#include "io/map_trailer.h"
+#include "io/vdb_writer.h"
+#include "mapping/vdb_state.h"
+#include "mapping/vdb_views.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+uint32_t vdb_flags(MapCompression compression) {
+  switch (compression) {
+    case MapCompression::none:
+      break;
+    case MapCompression::blosc:
+      return openvdb::io::COMPRESS_ACTIVE_MASK | openvdb::io::COMPRESS_BLOSC;
+    case MapCompression::zip:
+      return openvdb::io::COMPRESS_ACTIVE_MASK | openvdb::io::COMPRESS_ZIP;
+  }
+  return openvdb::io::COMPRESS_ACTIVE_MASK;
+}
+
+/// Which classes have a plane anywhere, by slot.
+std::vector<int> observed_classes(const Map& map) {
+  std::vector<bool> seen(size_t(map.classes.size()), false);
+  for (const Block& block : map.store.blocks())
+    if (block.geometry->observed())
+      for (const EvidencePlane& plane : block.evidence) seen[plane.slot] = true;
+  std::vector<int> slots;
+  for (int slot = 0; slot < map.classes.size(); ++slot)
+    if (seen[size_t(slot)]) slots.push_back(slot);
+  return slots;
+}
+
+bool has_color(const Map& map) {
+  for (const Block& block : map.store.blocks())
+    if (block.color != nullptr) return true;
+  return false;
+}
+
+/// One call for each grid of the file: made when it is written and gone afterwards, so that the file's size does not
+/// decide about memory.
+std::vector<std::function<openvdb::GridBase::Ptr()>> grids_of(const Map& map) {
+  std::vector<std::function<openvdb::GridBase::Ptr()>> grids;
+  grids.push_back([&] { return tsdf_grid(map); });
+  grids.push_back([&] { return weight_grid(map); });
+  if (has_color(map)) {
+    grids.push_back([&] { return color_grid(map); });
+    grids.push_back([&] { return color_count_grid(map); });
+  }
+  for (const int slot : observed_classes(map)) grids.push_back([&map, slot] { return evidence_grid(map, slot); });
+  return grids;
+}
+
+template <typename Grid>
+typename Grid::Ptr read_grid(openvdb::io::File& file, const std::string& name, const std::string& where) {
+  if (!file.hasGrid(name)) throw FormatError(describe_mismatch(where, "grids", "one named '" + name + "'", "none"));
+  const openvdb::GridBase::Ptr grid = file.readGrid(name);
+  auto typed = openvdb::gridPtrCast<Grid>(grid);
+  if (typed == nullptr)
+    throw FormatError(describe_mismatch(where, "grid '" + name + "'", "type " + Grid::gridType(), grid->type()));
+  return typed;
+}
+
+Map read_map(const fs::path& path) {
+  const std::string where = path.string();
+  openvdb::io::File file(where);
+  file.setCopyMaxBytes(0);
+  file.open(/*delayLoad=*/false);
+  const MapHeader header = read_metadata(*file.getMetadata(), where);
+  Map map(header.voxel_size_m, header.truncation_m);
+  map.classes = header.classes;
+  map.frames = header.frames;
+  map.metadata = header.metadata;
+  add_geometry(map, *read_grid<openvdb::FloatGrid>(file, "tsdf", where),
+               *read_grid<openvdb::FloatGrid>(file, "weight", where));
+  if (file.hasGrid("color_count"))
+    add_color(map, *read_grid<openvdb::Vec3SGrid>(file, "color", where),
+              *read_grid<openvdb::Int32Grid>(file, "color_count", where));
+  for (int slot = 0; slot < map.classes.size(); ++slot)
+    if (const std::string name = "evidence/" + map.classes.at_slot(slot).name; file.hasGrid(name))
+      add_evidence(map, slot, *read_grid<openvdb::FloatGrid>(file, name, where));
+  if (const std::string hash = map_hash(map); hash != header.hash)
+    throw FormatError(describe_mismatch(where, "map hash", header.hash, hash));
+  return map;
+}
+
+}  // namespace
+
+void save_map(const Map& map, const fs::path& path, const SaveOptions& options) {
+  openvdb::initialize();
+  AtomicFile file(path);
+  const auto failed = [&] { return IoError(path.string() + ": cannot write: " + std::strerror(errno)); };
+  std::vector<char> buffer(1 << 20);
+  std::ofstream os;
+  os.rdbuf()->pubsetbuf(buffer.data(), std::streamsize(buffer.size()));
+  os.open(file.path(), std::ios::binary | std::ios::in | std::ios::out);
+  const auto grids = grids_of(map);
+  const std::string hash = map_hash(map);
+  VdbWriter writer(os, to_metadata(map, hash), int32_t(grids.size()), vdb_flags(options.compression), hash);
+  for (const auto& make : grids) {
+    writer.write(*make());
+    // A full disk shows here, not after the remaining grids.
+    if (!os.good()) throw failed();
+  }
+  if (!os.flush()) throw failed();
+  os << make_map_trailer(file.path(), kMapFileVersion);
+  os.close();
+  if (!os) throw failed();
+  file.commit();
+}
+
+Map load_map(const fs::path& path) {
+  openvdb::initialize();
+  verify_map_trailer(path, kMapFileVersion);
+  try {
+    return read_map(path);
+  } catch (const openvdb::Exception& error) {
+    throw FormatError(path.string() + ": OpenVDB cannot read it: " + error.what());
+  }
+}
+
+}  // namespace felt

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "mapping/map.h"
+
+namespace felt {
+
+/// The map file: one OpenVDB file of stock grids, followed by a trailer with a checksum that stock readers do not look
+/// at. docs/file_format.md describes every grid and every key.
+inline constexpr uint32_t kMapFileVersion = 1;
+
+/// How leaf values are stored. All are exact; every stock reader built with the library named reads them.
+enum class MapCompression {
+  none,   ///< values of active voxels as they are
+  blosc,  ///< LZ4 with byte shuffling
+  zip     ///< DEFLATE: small and slow
+};
+
+struct SaveOptions {
+  MapCompression compression = MapCompression::blosc;
+};
+
+/// Writes the map so that `path` holds either what it held before or the whole new map, also through a crash or a full
+/// disk. Memory: one grid at a time. The same map gives the same bytes. Throws IoError.
+void save_map(const Map& map, const std::filesystem::path& path, const SaveOptions& options = {});
+
+/// Reads a map whose `map_hash` is that of the map that was saved, and which goes on as that one would have. The
+/// checksum is verified before any of the content is interpreted. Throws IoError where the file cannot be read and
+/// FormatError, with the reason, where it is no map file, has an unknown version, or was changed in any byte.
+Map load_map(const std::filesystem::path& path);
+
+}  // namespace felt

@@ -1,0 +1,154 @@
+#include "io/map_metadata.h"
+
+#include <openvdb/openvdb.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "io/map_file.h"
+
+namespace felt {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kFormat = "feltmap_format";
+constexpr const char* kVoxelSize = "voxel_size_m";
+constexpr const char* kTruncation = "truncation_m";
+constexpr const char* kHash = "map_hash";
+constexpr const char* kClasses = "class_table";
+constexpr const char* kFrames = "frame_journal";
+constexpr const char* kCentre = "voxel_centre";
+constexpr const char* kCentreRule = "index (i, j, k) is the voxel's centre, at (i, j, k) * voxel_size_m";
+const std::string kTextPrefix = "text/";
+
+json classes_to_json(const ClassTable& table) {
+  json rows = json::array();
+  for (const ClassInfo& c : table.classes())
+    rows.push_back(
+        {{"id", c.id}, {"name", c.name}, {"color", {c.color.r, c.color.g, c.color.b}}, {"ignore", c.ignore}});
+  return rows;
+}
+
+ClassTable classes_from_json(const json& rows) {
+  std::vector<ClassInfo> classes;
+  for (const json& row : rows) {
+    const json& color = row.at("color");
+    classes.push_back({row.at("id").get<uint16_t>(),
+                       row.at("name").get<std::string>(),
+                       {color.at(0).get<uint8_t>(), color.at(1).get<uint8_t>(), color.at(2).get<uint8_t>()},
+                       row.at("ignore").get<bool>()});
+  }
+  return classes.empty() ? ClassTable() : ClassTable(std::move(classes));
+}
+
+/// Frames as [first, step, count] triples: a recording that was fused whole is one triple.
+json frames_to_json(const std::vector<int64_t>& frames) {
+  json triples = json::array();
+  for (size_t i = 0; i < frames.size();) {
+    size_t end = i + 1;
+    const int64_t step = end < frames.size() ? frames[end] - frames[i] : 1;
+    while (end < frames.size() && frames[end] - frames[end - 1] == step) ++end;
+    triples.push_back({frames[i], step, end - i});
+    i = end;
+  }
+  return triples;
+}
+
+std::vector<int64_t> frames_from_json(const json& triples) {
+  // A journal is small; a count beyond this is damage that would allocate without bound.
+  constexpr int64_t kMostFrames = 100'000'000;
+  std::vector<int64_t> frames;
+  for (const json& triple : triples) {
+    const auto first = triple.at(0).get<int64_t>(), step = triple.at(1).get<int64_t>(),
+               count = triple.at(2).get<int64_t>();
+    if (count < 0 || count + int64_t(frames.size()) > kMostFrames || std::abs(first) > INT32_MAX ||
+        std::abs(step) > INT32_MAX)
+      throw FormatError("frame numbers out of range");
+    for (int64_t i = 0; i < count; ++i) frames.push_back(first + i * step);
+  }
+  return frames;
+}
+
+json journal_to_json(const FrameJournal& journal) {
+  json runs = json::array();
+  for (const FusedFrames& run : journal.runs)
+    runs.push_back({{"sequence", run.sequence}, {"settings", run.settings}, {"frames", frames_to_json(run.frames)}});
+  return runs;
+}
+
+FrameJournal journal_from_json(const json& runs) {
+  FrameJournal journal;
+  for (const json& run : runs)
+    journal.runs.push_back({run.at("sequence").get<std::string>(), run.at("settings").get<std::string>(),
+                            frames_from_json(run.at("frames"))});
+  return journal;
+}
+
+template <typename T>
+T value(const openvdb::MetaMap& metadata, const char* key, const std::string& where) {
+  const openvdb::Metadata::ConstPtr found = metadata[key];
+  if (found == nullptr) throw FormatError(describe_mismatch(where, "file metadata", std::string("key ") + key, "none"));
+  const auto* typed = dynamic_cast<const openvdb::TypedMetadata<T>*>(found.get());
+  if (typed == nullptr)
+    throw FormatError(
+        describe_mismatch(where, key, openvdb::TypedMetadata<T>().typeName() + " metadata", found->typeName()));
+  return typed->value();
+}
+
+double positive(const openvdb::MetaMap& metadata, const char* key, const std::string& where) {
+  const auto number = value<double>(metadata, key, where);
+  if (!(number > 0) || !std::isfinite(number))
+    throw FormatError(describe_mismatch(where, key, "a positive number", std::to_string(number)));
+  return number;
+}
+
+template <typename Read>
+auto parsed(const openvdb::MetaMap& metadata, const char* key, const std::string& where, Read read) {
+  const auto text = value<std::string>(metadata, key, where);
+  try {
+    return read(json::parse(text));
+  } catch (const std::exception& error) {
+    throw FormatError(describe_mismatch(where, key, "the JSON that docs/file_format.md describes", error.what()));
+  }
+}
+
+}  // namespace
+
+openvdb::MetaMap to_metadata(const Map& map, const std::string& hash) {
+  openvdb::MetaMap metadata;
+  metadata.insertMeta(kFormat, openvdb::Int32Metadata(int32_t(kMapFileVersion)));
+  metadata.insertMeta("creator", openvdb::StringMetadata("feltmap"));
+  metadata.insertMeta(kCentre, openvdb::StringMetadata(kCentreRule));
+  metadata.insertMeta(kVoxelSize, openvdb::DoubleMetadata(map.voxel_size_m));
+  metadata.insertMeta(kTruncation, openvdb::DoubleMetadata(map.truncation_m));
+  metadata.insertMeta(kHash, openvdb::StringMetadata(hash));
+  try {
+    metadata.insertMeta(kClasses, openvdb::StringMetadata(classes_to_json(map.classes).dump()));
+    metadata.insertMeta(kFrames, openvdb::StringMetadata(journal_to_json(map.frames).dump()));
+  } catch (const json::exception& error) {
+    throw FormatError(describe_mismatch("map", "names in the class table and frame journal", "UTF-8", error.what()));
+  }
+  for (const auto& [key, text] : map.metadata) metadata.insertMeta(kTextPrefix + key, openvdb::StringMetadata(text));
+  return metadata;
+}
+
+MapHeader read_metadata(const openvdb::MetaMap& metadata, const std::string& where) {
+  MapHeader header;
+  if (const auto version = value<int32_t>(metadata, kFormat, where); version != int32_t(kMapFileVersion))
+    throw FormatError(
+        describe_mismatch(where, "format version", std::to_string(kMapFileVersion), std::to_string(version)));
+  header.voxel_size_m = positive(metadata, kVoxelSize, where);
+  header.truncation_m = positive(metadata, kTruncation, where);
+  header.hash = value<std::string>(metadata, kHash, where);
+  header.classes = parsed(metadata, kClasses, where, classes_from_json);
+  header.frames = parsed(metadata, kFrames, where, journal_from_json);
+  for (auto entry = metadata.beginMeta(); entry != metadata.endMeta(); ++entry)
+    if (entry->first.starts_with(kTextPrefix))
+      header.metadata[entry->first.substr(kTextPrefix.size())] =
+          value<std::string>(metadata, entry->first.c_str(), where);
+  return header;
+}
+
+}  // namespace felt

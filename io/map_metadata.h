@@ -1,0 +1,26 @@
+#pragma once
+
+#include <openvdb/MetaMap.h>
+
+#include <string>
+
+#include "mapping/map.h"
+
+namespace felt {
+
+/// What a map file's metadata says (docs/file_format.md names the keys).
+struct MapHeader {
+  double voxel_size_m = 0;
+  double truncation_m = 0;
+  std::string hash;  ///< `map_hash` of what was saved
+  ClassTable classes;
+  FrameJournal frames;
+  std::map<std::string, std::string> metadata;
+};
+
+openvdb::MetaMap to_metadata(const Map& map, const std::string& hash);
+
+/// Throws FormatError naming `where` and the key that is absent or wrong.
+MapHeader read_metadata(const openvdb::MetaMap& metadata, const std::string& where);
+
+}  // namespace felt
