@@ -1,0 +1,410 @@
+#include "mapping/region_query.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <queue>
+
+#include "mapping/region_surface.h"
+
+namespace felt {
+namespace {
+
+std::string metres(double x) {
+  char text[32];
+  snprintf(text, sizeof text, "%.3f m", x);
+  return text;
+}
+
+SurfaceRule band_rule(const Map& map, const RegionSettings& settings) {
+  SurfaceRule rule;
+  rule.band_m = float(settings.band_voxels * map.voxel_size_m);
+  rule.min_weight = float(settings.min_weight);
+  return rule;
+}
+
+/// Flood of one region: block by block, each from the bits that reached it.
+class Flood {
+public:
+  Flood(const Map& map, const SurfaceRule& rule) : map_(map), rule_(rule), number_(map.store.size(), kUnknown) {}
+
+  /// Grows from the contact's voxel; returns store numbers of the blocks with a region.
+  Region run(const Index3& seed) {
+    plant(seed);
+    while (!wave_.empty()) {
+      examine_wave();
+      std::vector<uint32_t> current;
+      current.swap(wave_);
+      for (const uint32_t n : current) visit(n);
+    }
+    return collect();
+  }
+
+  /// Where the region may grow through, of a block of the region.
+  const BlockMask& grown(const BlockCoord& block) const { return state_[number_[map_.store.find(block)]].grown; }
+
+private:
+  static constexpr uint32_t kUnknown = 0xffffffff;
+  struct State {
+    uint32_t block;  ///< store number
+    bool examined = false, queued = false;
+    BlockMask pending;  ///< bits that reached the block since its last visit
+    BlockMask region, grown;
+    BlockSurface surface;
+  };
+
+  State& state_of(uint32_t block) {
+    if (number_[block] == kUnknown) {
+      number_[block] = uint32_t(state_.size());
+      state_.emplace_back().block = block;
+    }
+    return state_[number_[block]];
+  }
+
+  void reach(uint32_t block, const BlockMask& bits) {
+    State& state = state_of(block);
+    const BlockMask fresh = bits - state.region;
+    // Once the block was examined, bits that are no candidates need no visit.
+    if (!(state.examined ? fresh & state.surface.candidate : fresh).any()) return;
+    state.pending |= fresh;
+    if (state.queued) return;
+    state.queued = true;
+    wave_.push_back(number_[block]);
+  }
+
+  /// The contact's voxel and those neighbours whose normals agree with its own: a contact beside a crease is no
+  /// interior voxel, but it belongs to the surface that it lies on.
+  void plant(const Index3& seed) {
+    const Eigen::Vector3f normal = surface_normal(map_, seed, rule_.min_weight);
+    for (int dx = -1; dx <= 1; ++dx)
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dz = -1; dz <= 1; ++dz) {
+          const Index3 v{seed.x + dx, seed.y + dy, seed.z + dz};
+          const uint32_t block = map_.store.find(block_of_voxel(v));
+          if (block == BlockStore::kNone) continue;
+          if (!(v == seed) && surface_normal(map_, v, rule_.min_weight).dot(normal) < rule_.cos_normal_change) continue;
+          BlockMask bit;
+          bit.set(offset_in_block(v));
+          reach(block, bit);
+        }
+  }
+
+  void examine_wave() {
+    std::vector<uint32_t> fresh;
+    for (const uint32_t n : wave_)
+      if (!state_[n].examined) fresh.push_back(n);
+    const auto examine = [&](size_t i) {
+      State& state = state_[fresh[i]];
+      state.surface = examine_block(map_, map_.store[state.block], rule_);
+      state.examined = true;
+    };
+    if (fresh.size() < 16) {
+      for (size_t i = 0; i < fresh.size(); ++i) examine(i);
+    } else {
+      tbb::parallel_for(size_t(0), fresh.size(), examine);
+    }
+  }
+
+  void visit(uint32_t n) {
+    BlockMask grown = state_[n].pending & state_[n].surface.interior;
+    {
+      State& state = state_[n];
+      state.queued = false;
+      state.region |= state.pending & state.surface.candidate;
+      state.pending = {};
+      grown -= state.grown;
+      if (!grown.any()) return;
+      for (BlockMask last; !(last == grown);) {
+        last = grown;
+        grown |= dilated_inside(grown) & state.surface.interior;
+      }
+      grown -= state.grown;
+      state.grown |= grown;
+    }
+    const std::array<BlockMask, 27> reached = dilated(grown);
+    state_[n].region |= reached[13] & state_[n].surface.candidate;
+    const BlockCoord c = map_.store[state_[n].block].coord;
+    for (int i = 0; i < 27; ++i) {
+      if (i == 13 || !reached[i].any()) continue;
+      const uint32_t block = map_.store.find({c.x + i / 9 - 1, c.y + i / 3 % 3 - 1, c.z + i % 3 - 1});
+      if (block != BlockStore::kNone) reach(block, reached[i]);
+    }
+  }
+
+  Region collect() const {
+    std::vector<const State*> found;
+    for (const State& state : state_)
+      if (state.region.any()) found.push_back(&state);
+    const auto coord = [&](const State* state) { return map_.store[state->block].coord; };
+    std::sort(found.begin(), found.end(), [&](const State* a, const State* b) { return coord(a) < coord(b); });
+    Region region;
+    for (const State* state : found) region.append(coord(state), state->region);
+    return region;
+  }
+
+  const Map& map_;
+  const SurfaceRule rule_;
+  std::vector<uint32_t> number_;  ///< by store number: index of its state
+  std::vector<State> state_;
+  std::vector<uint32_t> wave_;
+};
+
+/// Keeps the voxels of a connected region within `radius_voxels` of the seed along the region (Dijkstra over
+/// 26-neighbours with steps 1, sqrt 2, sqrt 3; an overestimate of the geodesic by at most 8 %).
+Region within_geodesic(const Region& region, const Flood& flood, const Index3& seed, double radius_voxels) {
+  struct Reach {
+    float distance;
+    Index3 voxel;
+    bool operator>(const Reach& o) const { return distance > o.distance; }
+  };
+  std::vector<std::array<float, kBlockVoxels>> distance(region.blocks());
+  for (auto& d : distance) d.fill(std::numeric_limits<float>::infinity());
+  const auto slot_of = [&](const Index3& v) -> float* {
+    const BlockMask* bits = region.find(block_of_voxel(v));
+    if (bits == nullptr || !bits->test(offset_in_block(v))) return nullptr;
+    return &distance[size_t(bits - region.mask.data())][size_t(offset_in_block(v))];
+  };
+  std::priority_queue<Reach, std::vector<Reach>, std::greater<>> queue;
+  *slot_of(seed) = 0;
+  queue.push({0, seed});
+  while (!queue.empty()) {
+    const Reach r = queue.top();
+    queue.pop();
+    if (r.distance > *slot_of(r.voxel)) continue;
+    if (!(r.voxel == seed) && !flood.grown(block_of_voxel(r.voxel)).test(offset_in_block(r.voxel))) continue;
+    for (int dx = -1; dx <= 1; ++dx)
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dz = -1; dz <= 1; ++dz) {
+          const Index3 v{r.voxel.x + dx, r.voxel.y + dy, r.voxel.z + dz};
+          float* known = slot_of(v);
+          const float d = r.distance + std::sqrt(float(dx * dx + dy * dy + dz * dz));
+          if (known == nullptr || d > radius_voxels || d >= *known) continue;
+          *known = d;
+          queue.push({d, v});
+        }
+  }
+  Region near;
+  for (size_t b = 0; b < region.blocks(); ++b) {
+    BlockMask bits;
+    for_each_bit(region.mask[b], [&](int i) {
+      if (distance[b][size_t(i)] <= radius_voxels) bits.set(i);
+    });
+    if (bits.any()) near.append(region.coord[b], bits);
+  }
+  return near;
+}
+
+Region surface_blocks(const Map& map, const SurfaceRule& rule) {
+  const std::vector<uint32_t> order = map.store.sorted();
+  std::vector<BlockMask> masks(order.size());
+  tbb::parallel_for(size_t(0), order.size(), [&](size_t n) { masks[n] = candidates(map.store[order[n]], rule); });
+  Region region;
+  for (size_t n = 0; n < order.size(); ++n)
+    if (masks[n].any()) region.append(map.store[order[n]].coord, masks[n]);
+  return region;
+}
+
+void limit_color(const Map& map, const Index3& voxel, double change, SurfaceRule& rule) {
+  const Block& block = *map.store.get(block_of_voxel(voxel));
+  const int i = offset_in_block(voxel);
+  if (block.color == nullptr || block.color->count[i] == 0)
+    throw TouchError("region: colour limit: expected a coloured contact, found none there");
+  rule.limit_color = true;
+  rule.color[0] = block.color->r[i] / 256.0f;
+  rule.color[1] = block.color->g[i] / 256.0f;
+  rule.color[2] = block.color->b[i] / 256.0f;
+  rule.color_change = float(change);
+}
+
+bool map_has_labels(const Map& map) {
+  return std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
+                     [](const Block& b) { return !b.evidence.empty(); });
+}
+
+/// Strongest class of the surface band within two voxels of the contact, -1 where there is no evidence.
+int contact_class(const Map& map, const Index3& centre, const SurfaceRule& band) {
+  std::vector<double> sum(size_t(std::max(1, map.classes.size())), 0.0);
+  for (int dx = -2; dx <= 2; ++dx)
+    for (int dy = -2; dy <= 2; ++dy)
+      for (int dz = -2; dz <= 2; ++dz) {
+        const Index3 v{centre.x + dx, centre.y + dy, centre.z + dz};
+        const Block* block = map.store.get(block_of_voxel(v));
+        const int i = offset_in_block(v);
+        if (block == nullptr || block->geometry->weight[i] < band.min_weight ||
+            std::abs(block->geometry->tsdf[i]) > band.band_m)
+          continue;
+        for (const EvidencePlane& e : block->evidence)
+          if (e.slot < sum.size()) sum[e.slot] += e.counts->value[i];
+      }
+  const auto best = std::max_element(sum.begin(), sum.end());
+  return *best > 0 ? int(best - sum.begin()) : -1;
+}
+
+/// Says what is at a point that is too far from every surface.
+[[noreturn]] void fail_to_snap(const Map& map, const Eigen::Vector3d& p, const std::string& where, double radius_m) {
+  const std::string expected = "observed surface within " + metres(radius_m);
+  const Eigen::Vector3d q = p / map.voxel_size_m;
+  const Index3 v{int32_t(std::lround(q.x())), int32_t(std::lround(q.y())), int32_t(std::lround(q.z()))};
+  const Block* block = map.store.get(block_of_voxel(v));
+  if (block != nullptr && block->geometry->weight[offset_in_block(v)] > 0) {
+    const double d = block->geometry->tsdf[offset_in_block(v)];
+    throw TouchError(describe_mismatch(where, "contact", expected,
+                                       d > 0 ? "free space (signed distance " + metres(d) + ")"
+                                             : "the inside of something (signed distance " + metres(d) + ")"));
+  }
+  Eigen::Array3d lo = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
+  for (const Block& b : map.store.blocks()) {
+    const Eigen::Array3d first(b.coord.x * 8.0, b.coord.y * 8.0, b.coord.z * 8.0);
+    lo = lo.min(first - 0.5);
+    hi = hi.max(first + 7.5);
+  }
+  const bool outside = map.store.empty() || (q.array() < lo).any() || (q.array() > hi).any();
+  throw TouchError(
+      describe_mismatch(where, "contact", expected, outside ? "a point outside the map" : "unobserved space"));
+}
+
+}  // namespace
+
+const char* rule_name(RegionRule rule) {
+  return rule == RegionRule::connected ? "connected" : rule == RegionRule::mask ? "mask" : "sphere";
+}
+
+RegionRule rule_of_name(const std::string& name) {
+  for (const RegionRule rule : {RegionRule::connected, RegionRule::mask, RegionRule::sphere})
+    if (name == rule_name(rule)) return rule;
+  throw TouchError(describe_mismatch("region", "rule", "connected, mask or sphere", "'" + name + "'"));
+}
+
+void validate(const RegionSettings& s) {
+  std::string problems;
+  const auto expect = [&](bool good, const char* what, const char* expected, double found) {
+    if (good) return;
+    char text[32];
+    snprintf(text, sizeof text, "%g", found);
+    problems.append(problems.empty() ? "" : "\n").append(describe_mismatch("region", what, expected, text));
+  };
+  expect(s.band_voxels > 0 && s.band_voxels <= 8, "band_voxels", "0 < band <= 8", s.band_voxels);
+  expect(s.min_weight > 0 && std::isfinite(s.min_weight), "min_weight", "a positive number", s.min_weight);
+  expect(s.snap_voxels >= 0 && s.snap_voxels <= 64, "snap_voxels", "0 to 64", s.snap_voxels);
+  expect(s.class_ratio >= 0 && s.class_ratio <= 1, "class_ratio", "0 to 1", s.class_ratio);
+  expect(s.normal_change_deg > 0 && s.normal_change_deg <= 180, "normal_change_deg", "0 < angle <= 180",
+         s.normal_change_deg);
+  expect(s.color_change >= 0, "color_change", "0 or more", s.color_change);
+  expect(s.radius_m > 0, "radius_m", "a positive number", s.radius_m);
+  if (s.rule == RegionRule::sphere) expect(std::isfinite(s.radius_m), "radius_m", "a finite radius", s.radius_m);
+  if (!problems.empty()) throw TouchError(problems);
+}
+
+Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const RegionSettings& settings) {
+  char where[96];
+  snprintf(where, sizeof where, "point (%.3f, %.3f, %.3f)", point_m.x(), point_m.y(), point_m.z());
+  const Eigen::Vector3d q = point_m / map.voxel_size_m;
+  if (!q.allFinite() || q.array().abs().maxCoeff() > 1e9)
+    throw TouchError(describe_mismatch(where, "contact", "three finite coordinates inside the map", "this"));
+  const SurfaceRule band = band_rule(map, settings);
+  const double radius = settings.snap_voxels;
+  const auto lo = [&](double x) { return int32_t(std::ceil(x - radius)); };
+  const auto hi = [&](double x) { return int32_t(std::floor(x + radius)); };
+  Contact contact;
+  contact.point_m = point_m;
+  // Distance to the surface through a voxel's centre: the nearest zero crossing, not the nearest band voxel.
+  double best = std::numeric_limits<double>::infinity();
+  for (int32_t x = lo(q.x()); x <= hi(q.x()); ++x)
+    for (int32_t y = lo(q.y()); y <= hi(q.y()); ++y)
+      for (int32_t z = lo(q.z()); z <= hi(q.z()); ++z) {
+        const Block* block = map.store.get(block_of_voxel({x, y, z}));
+        const int i = offset_in_block({x, y, z});
+        if (block == nullptr || block->geometry->weight[i] < band.min_weight) continue;
+        const double tsdf = std::abs(double(block->geometry->tsdf[i]));
+        const Eigen::Vector3d centre(x, y, z);
+        const double from_point = (centre - q).norm();
+        if (tsdf > band.band_m || from_point > radius) continue;
+        const double cost = from_point * from_point + tsdf * tsdf / (map.voxel_size_m * map.voxel_size_m);
+        if (cost >= best) continue;
+        best = cost;
+        contact.voxel = {x, y, z};
+      }
+  if (!std::isfinite(best)) fail_to_snap(map, point_m, where, radius * map.voxel_size_m);
+  contact.normal = surface_normal(map, contact.voxel, band.min_weight).cast<double>();
+  const Block& block = *map.store.get(block_of_voxel(contact.voxel));
+  contact.surface_m = Eigen::Vector3d(contact.voxel.x, contact.voxel.y, contact.voxel.z) * map.voxel_size_m -
+                      double(block.geometry->tsdf[offset_in_block(contact.voxel)]) * contact.normal;
+  contact.distance_m = (contact.surface_m - point_m).norm();
+  contact.slot = contact_class(map, contact.voxel, band);
+  if (contact.slot < 0 && map_has_labels(map))
+    throw TouchError(describe_mismatch(where, "contact", "a surface with a class",
+                                       "one without labels (an ignored class, or never labelled)"));
+  return contact;
+}
+
+Region find_region(const Map& map, const Contact& contact, const RegionSettings& settings) {
+  validate(settings);
+  SurfaceRule rule = band_rule(map, settings);
+  rule.centre = contact.voxel;
+  rule.radius_voxels = float(settings.radius_m / map.voxel_size_m);
+  if (settings.rule == RegionRule::sphere) return surface_blocks(map, rule);
+  if (settings.rule != RegionRule::connected)
+    throw TouchError(describe_mismatch("region", "rule", "connected or sphere", rule_name(settings.rule)));
+  rule.slot = contact.slot;
+  rule.class_ratio = float(settings.class_ratio);
+  rule.cos_normal_change = float(std::cos(settings.normal_change_deg * std::numbers::pi / 180));
+  if (std::isfinite(settings.color_change)) limit_color(map, contact.voxel, settings.color_change, rule);
+  Flood flood(map, rule);
+  Region region = flood.run(contact.voxel);
+  if (region.empty())
+    throw TouchError(
+        "region: contact: expected a voxel that agrees with its own surroundings, found class noise there");
+  if (std::isfinite(settings.radius_m) && region.contains(contact.voxel))
+    region = within_geodesic(region, flood, contact.voxel, settings.radius_m / map.voxel_size_m);
+  return region;
+}
+
+Region find_region(const Map& map, const ViewMask& view, const RegionSettings& settings, const Contact* contact) {
+  validate(settings);
+  const auto size_text = [](int w, int h) { return std::to_string(w) + " x " + std::to_string(h); };
+  if (view.mask.width() != view.camera.width || view.mask.height() != view.camera.height)
+    throw TouchError(describe_mismatch("region mask", "size", size_text(view.camera.width, view.camera.height),
+                                       size_text(view.mask.width(), view.mask.height())));
+  const Region surface = surface_blocks(map, band_rule(map, settings));
+  const Eigen::Isometry3d T_camera_world = view.T_world_camera.inverse();
+  const double vs = map.voxel_size_m;
+  const auto in_camera = [&](const BlockCoord& c, int i) -> Eigen::Vector3d {
+    const Index3 f = first_voxel(c), v = voxel_of_offset(i);
+    return T_camera_world * (Eigen::Vector3d(f.x + v.x, f.y + v.y, f.z + v.z) * vs);
+  };
+  const auto for_each_voxel = [&](const auto& visit) {
+    for (size_t b = 0; b < surface.blocks(); ++b)
+      for_each_bit(surface.mask[b], [&](int i) {
+        const Eigen::Vector3d p = in_camera(surface.coord[b], i);
+        if (p.z() > vs) visit(b, i, p, view.camera.project(p));
+      });
+  };
+  // Depth of the nearest surface voxel by pixel; a voxel covers every pixel that its width subtends.
+  DepthImage nearest(view.camera.width, view.camera.height, std::numeric_limits<float>::infinity());
+  for_each_voxel([&](size_t, int, const Eigen::Vector3d& p, const Eigen::Vector2d& uv) {
+    const double ru = 0.5 * view.camera.fx * vs / p.z(), rv = 0.5 * view.camera.fy * vs / p.z();
+    const auto clamp = [](double x, int n) { return int(std::clamp(x, 0.0, double(n))); };
+    const int u1 = clamp(std::floor(uv.x() + ru) + 1, nearest.width()),
+              v1 = clamp(std::floor(uv.y() + rv) + 1, nearest.height());
+    for (int v = clamp(std::ceil(uv.y() - rv), nearest.height()); v < v1; ++v)
+      for (int u = clamp(std::ceil(uv.x() - ru), nearest.width()); u < u1; ++u)
+        nearest(u, v) = std::min(nearest(u, v), float(p.z()));
+  });
+  std::vector<BlockMask> kept(surface.blocks());
+  for_each_voxel([&](size_t b, int i, const Eigen::Vector3d& p, const Eigen::Vector2d& uv) {
+    const double u = std::floor(uv.x() + 0.5), v = std::floor(uv.y() + 0.5);
+    if (u < 0 || v < 0 || u >= nearest.width() || v >= nearest.height()) return;
+    if (view.mask(int(u), int(v)) != 0 && p.z() <= double(nearest(int(u), int(v))) + 2 * vs) kept[b].set(i);
+  });
+  Region region;
+  for (size_t b = 0; b < surface.blocks(); ++b)
+    if (kept[b].any()) region.append(surface.coord[b], kept[b]);
+  if (region.empty()) throw TouchError("region mask: expected pixels that see the map, found none");
+  if (contact != nullptr && !region.contains(contact->voxel))
+    throw TouchError("region mask: expected the contact inside the mask, found it outside");
+  return region;
+}
+
+}  // namespace felt

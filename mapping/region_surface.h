@@ -1,0 +1,45 @@
+#pragma once
+
+#include <limits>
+
+#include <Eigen/Core>
+
+#include "mapping/map.h"
+#include "mapping/region.h"
+
+namespace felt {
+
+/// What makes a voxel a candidate of a region, resolved to numbers of the map.
+struct SurfaceRule {
+  float band_m = 0;
+  float min_weight = 1;
+  int slot = -1;             ///< class to agree with; -1: classes do not matter
+  float class_ratio = 0;     ///< see RegionSettings
+  bool limit_color = false;  ///< whether `color` and `color_change` count
+  float color[3] = {0, 0, 0};
+  float color_change = 0;
+  float cos_normal_change = -1;
+  Index3 centre;  ///< of the Euclidean limit
+  float radius_voxels = std::numeric_limits<float>::infinity();
+};
+
+/// Candidates of one block, and those that the region may grow through.
+struct BlockSurface {
+  BlockMask candidate;
+  BlockMask interior;  ///< candidates whose neighbours in the band all have normals within the limit of theirs
+};
+
+/// Voxels of the block in the surface band (no other limit).
+BlockMask surface_band(const Block& block, float band_m, float min_weight);
+
+/// Band, class, colour and radius limits; the specification of `connected`'s candidates.
+BlockMask candidates(const Block& block, const SurfaceRule& rule);
+
+/// Reads the block and its 26 neighbours; blocks may be examined in parallel.
+BlockSurface examine_block(const Map& map, const Block& block, const SurfaceRule& rule);
+
+/// Unit gradient of the signed distance at a voxel by central differences, one-sided at unobserved neighbours; zero
+/// where there is none.
+Eigen::Vector3f surface_normal(const Map& map, const Index3& voxel, float min_weight);
+
+}  // namespace felt
