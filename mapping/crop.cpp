@@ -1,0 +1,67 @@
+#include "mapping/crop.h"
+
+#include <algorithm>
+#include <array>
+
+namespace felt {
+namespace {
+
+Eigen::Vector3d center_m(const Map& map, const BlockCoord& coord, int offset) {
+  const Index3 first = first_voxel(coord), local = voxel_of_offset(offset);
+  return Eigen::Vector3d(first.x + local.x, first.y + local.y, first.z + local.z) * map.voxel_size_m;
+}
+
+using Mask = std::array<bool, kBlockVoxels>;
+
+void copy_observed(const Block& from, const Mask& inside, BlockStore& store, Block& to) {
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    if (!inside[i]) continue;
+    to.geometry->tsdf[i] = from.geometry->tsdf[i];
+    to.geometry->weight[i] = from.geometry->weight[i];
+  }
+  if (from.color != nullptr) {
+    ColorPlanes& color = store.add_color(to);
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      if (!inside[i]) continue;
+      color.r[i] = from.color->r[i], color.g[i] = from.color->g[i], color.b[i] = from.color->b[i];
+      color.count[i] = from.color->count[i];
+    }
+  }
+  for (const EvidencePlane& evidence : from.evidence) {
+    Plane* counts = store.new_plane();
+    for (int i = 0; i < kBlockVoxels; ++i)
+      if (inside[i]) counts->value[i] = evidence.counts->value[i];
+    to.evidence.push_back({evidence.slot, counts});
+  }
+}
+
+}  // namespace
+
+Map cropped(const Map& map, const Eigen::AlignedBox3d& box_m) {
+  Map result(map.voxel_size_m, map.truncation_m);
+  result.classes = map.classes;
+  result.metadata = map.metadata;
+  for (const uint32_t number : map.store.sorted()) {
+    const Block& block = map.store[number];
+    Mask inside;
+    for (int i = 0; i < kBlockVoxels; ++i)
+      inside[i] = block.geometry->weight[i] > 0 && box_m.contains(center_m(map, block.coord, i));
+    if (std::none_of(inside.begin(), inside.end(), [](bool in) { return in; })) continue;
+    copy_observed(block, inside, result.store, result.store[result.store.find_or_create(block.coord)]);
+  }
+  return result;
+}
+
+Eigen::AlignedBox3d observed_bounds(const Map& map) {
+  Eigen::AlignedBox3d bounds;
+  for (const Block& block : map.store.blocks()) {
+    // Most blocks lie inside what is already known.
+    const bool known =
+        bounds.contains(center_m(map, block.coord, 0)) && bounds.contains(center_m(map, block.coord, kBlockVoxels - 1));
+    for (int i = 0; !known && i < kBlockVoxels; ++i)
+      if (block.geometry->weight[i] > 0) bounds.extend(center_m(map, block.coord, i));
+  }
+  return bounds;
+}
+
+}  // namespace felt

@@ -1,0 +1,77 @@
+#include "mapping/crop.h"
+
+#include <catch2/catch.hpp>
+
+namespace felt {
+namespace {
+
+constexpr double kVoxel = 0.1;
+
+/// Two blocks side by side along x (voxels 0..15), every voxel observed, with colour and one class.
+Map two_blocks() {
+  Map map(kVoxel, 4 * kVoxel);
+  for (const int bx : {0, 1}) {
+    Block& block = map.store[map.store.find_or_create({bx, 0, 0})];
+    ColorPlanes& color = map.store.add_color(block);
+    block.evidence.push_back({3, map.store.new_plane()});
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      block.geometry->tsdf[i] = float(i) * 1e-3f;
+      block.geometry->weight[i] = float(bx + 1);
+      color.r[i] = uint16_t(i), color.g[i] = 7, color.b[i] = 9, color.count[i] = 2;
+      block.evidence[0].counts->value[i] = float(i);
+    }
+  }
+  return map;
+}
+
+}  // namespace
+
+TEST_CASE("a crop keeps every value of the voxels whose centres are inside and forgets the others") {
+  const Map map = two_blocks();
+  // Voxel centres 0.6, 0.7 | 0.8 lie inside along x.
+  const Eigen::AlignedBox3d box(Eigen::Vector3d(0.55, 0, 0), Eigen::Vector3d(0.85, 0.35, 9));
+  const Map part = cropped(map, box);
+  REQUIRE(part.store.size() == 2);
+  for (const Block& whole : map.store.blocks()) {
+    const Block* kept = part.store.get(whole.coord);
+    REQUIRE(kept != nullptr);
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      const Index3 local = voxel_of_offset(i);
+      const int x = whole.coord.x * 8 + local.x;
+      if (x >= 6 && x <= 8 && local.y <= 3) {
+        REQUIRE(kept->geometry->tsdf[i] == whole.geometry->tsdf[i]);
+        REQUIRE(kept->geometry->weight[i] == whole.geometry->weight[i]);
+        REQUIRE(kept->color->r[i] == whole.color->r[i]);
+        REQUIRE(kept->color->count[i] == whole.color->count[i]);
+        REQUIRE(kept->evidence.at(0).slot == 3);
+        REQUIRE(kept->evidence[0].counts->value[i] == whole.evidence[0].counts->value[i]);
+      } else {
+        REQUIRE(kept->geometry->weight[i] == 0);
+        REQUIRE(kept->geometry->tsdf[i] == part.store.tsdf_background_m());
+        REQUIRE(kept->color->count[i] == 0);
+        REQUIRE(kept->evidence[0].counts->value[i] == 0);
+      }
+    }
+  }
+  CHECK(active_voxel_count(part) == 3 * 4 * 8);
+}
+
+TEST_CASE("a crop to everything has the hash of the map, a crop to nothing has no blocks") {
+  const Map map = two_blocks();
+  CHECK(map_hash(cropped(map, observed_bounds(map))) == map_hash(map));
+  const Eigen::AlignedBox3d elsewhere(Eigen::Vector3d(5, 5, 5), Eigen::Vector3d(6, 6, 6));
+  CHECK(cropped(map, elsewhere).store.empty());
+}
+
+TEST_CASE("the bounds of a map are the outermost centres of observed voxels") {
+  Map map = two_blocks();
+  Block& second = map.store[map.store.find({1, 0, 0})];
+  for (int i = 0; i < kBlockVoxels; ++i) second.geometry->weight[i] = voxel_of_offset(i).x == 2 ? 1.0f : 0.0f;
+  const Eigen::AlignedBox3d bounds = observed_bounds(map);
+  CHECK(bounds.min().norm() == Approx(0).margin(1e-12));
+  CHECK(bounds.max().x() == Approx(10 * kVoxel));
+  CHECK(bounds.max().y() == Approx(7 * kVoxel));
+  CHECK(observed_bounds(Map(0.1, 0.4)).isEmpty());
+}
+
+}  // namespace felt
