@@ -97,7 +97,7 @@ private:
     size_t count() const { return count_; }
 
   private:
-    static constexpr size_t kChunk = 64;
+    static constexpr size_t kChunk = 16;
     std::vector<std::unique_ptr<T[]>> chunks_;
     size_t used_ = 0, count_ = 0;
   };

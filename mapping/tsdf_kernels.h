@@ -47,7 +47,7 @@ struct SensorNoise {
 struct alignas(64) BlockObservation {
   float sdf_m[kBlockVoxels];        ///< truncated; only where valid
   float weight[kBlockVoxels];       ///< only where valid
-  int32_t pixel[kBlockVoxels];      ///< v * width + u; only where valid
+  int32_t pixel[kBlockVoxels];      ///< v * width + u; some pixel of the image where not valid
   uint8_t valid[kBlockVoxels / 8];  ///< bit z of byte x * 8 + y: the mask layout of an OpenVDB leaf
 };
 

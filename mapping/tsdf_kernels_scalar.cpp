@@ -36,12 +36,14 @@ bool observe_block_scalar(const BlockCoord& block, const DepthView& view, BlockO
       uint8_t bits = 0;
       for (int zi = 0; zi < 8; ++zi) {
         const int lane = y * 8 + zi, i = x * 64 + lane;
+        out.pixel[i] = 0;
         const float z = z0 + view.plane[2][lane];
         const float inverse_z = 1.0f / z;
         const float u = (hu0 + view.plane[0][lane]) * inverse_z;
         const float v = (hv0 + view.plane[1][lane]) * inverse_z;
         if (!(z > 0 && u >= 0 && v >= 0 && u < float(view.width) && v < float(view.height))) continue;
         const int32_t pixel = int32_t(v) * view.width + int32_t(u);
+        out.pixel[i] = pixel;
         const float d = view.depth_m[pixel];
         if (!(d >= view.min_depth_m && d <= view.max_depth_m)) continue;
         float sdf = d - z;
@@ -54,7 +56,6 @@ bool observe_block_scalar(const BlockCoord& block, const DepthView& view, BlockO
         if (!view.carve && !(sdf < view.truncation_m)) continue;
         out.sdf_m[i] = std::min(sdf, view.truncation_m);
         out.weight[i] = observation_weight(view, d, sdf);
-        out.pixel[i] = pixel;
         bits |= uint8_t(1u << zi);
       }
       out.valid[x * 8 + y] = bits;

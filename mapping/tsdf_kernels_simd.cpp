@@ -9,6 +9,22 @@
 #include "core/simd.h"
 #include "mapping/tsdf_kernels.h"
 
+#ifndef FELTMAP_FETCH_PIXELS
+#define FELTMAP_FETCH_PIXELS
+namespace felt {
+namespace {
+
+// Plain loads: x86 gather instructions take 2 to 4 times as long where microcode guards them against data sampling.
+// Compiled for the baseline target, so that no compiler turns the loop into a gather.
+template <typename T>
+[[gnu::noinline]] void fetch_pixels(const T* image, const int32_t* pixel, int count, T* out) {
+  for (int i = 0; i < count; ++i) out[i] = image[uint32_t(pixel[i])];
+}
+
+}  // namespace
+}  // namespace felt
+#endif
+
 HWY_BEFORE_NAMESPACE();
 namespace felt::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -23,17 +39,16 @@ constexpr FloatTag kF;
 constexpr IntTag kI;
 constexpr U16Tag kU16;
 
-/// Bits of lanes [i, i + N) of a block: whole bytes, or a nibble where vectors are half rows.
+/// Sets the bits of lanes [i, i + N) of a block: whole bytes, or a part of one where vectors are shorter than a row.
 HWY_INLINE void store_bits(FloatMask mask, int i, uint8_t* valid) {
   uint8_t bits[8] = {};
   hn::StoreMaskBits(kF, mask, bits);
   const int lanes = int(hn::Lanes(kF));
   if (lanes >= 8) {
     std::memcpy(valid + i / 8, bits, size_t(lanes) / 8);
-  } else if ((i & 7) == 0) {
-    valid[i / 8] = bits[0];
   } else {
-    valid[i / 8] = uint8_t(valid[i / 8] | bits[0] << (i & 7));
+    const int others = ~(((1 << lanes) - 1) << (i & 7));
+    valid[i / 8] = uint8_t((valid[i / 8] & others) | bits[0] << (i & 7));
   }
 }
 
@@ -43,7 +58,7 @@ HWY_INLINE FloatMask load_bits(const uint8_t* valid, int i) {
   if (lanes >= 8) {
     std::memcpy(bits, valid + i / 8, size_t(lanes) / 8);
   } else {
-    bits[0] = uint8_t(valid[i / 8] >> (i & 7));
+    bits[0] = uint8_t(valid[i / 8] >> (i & 7) & ((1 << lanes) - 1));
   }
   return hn::LoadMaskBits(kF, bits);
 }
@@ -84,7 +99,9 @@ bool observe(const BlockCoord& block, const DepthView& view, BlockObservation& o
   // Carving takes free space at any distance in front.
   const FloatVec sdf_limit = hn::Set(kF, view.carve ? HWY_MAX(view.max_depth_m, 1.0f) * 1e6f : view.truncation_m);
   const FloatVec dropoff_start = hn::Set(kF, -view.dropoff_start_m), dropoff_slope = hn::Set(kF, view.dropoff_slope);
-  bool any = false;
+  // Where each voxel falls. Voxels outside the image take pixel 0, so that reading depth needs no test.
+  bool in_view = false;
+  std::memset(out.valid, 0, sizeof out.valid);
   for (int x = 0; x < 8; ++x) {
     const FloatVec hu0 = hn::Set(kF, base[0] + float(x) * view.step_x[0]);
     const FloatVec hv0 = hn::Set(kF, base[1] + float(x) * view.step_x[1]);
@@ -95,29 +112,40 @@ bool observe(const BlockCoord& block, const DepthView& view, BlockObservation& o
       const FloatVec inverse_z = hn::Div(one, z);
       const FloatVec u = hn::Mul(hn::Add(hu0, hn::Load(kF, view.plane[0] + lane)), inverse_z);
       const FloatVec v = hn::Mul(hn::Add(hv0, hn::Load(kF, view.plane[1] + lane)), inverse_z);
-      FloatMask valid = hn::And(hn::And(hn::Gt(z, zero), hn::And(hn::Ge(u, zero), hn::Ge(v, zero))),
-                                hn::And(hn::Lt(u, width), hn::Lt(v, height)));
+      const FloatMask inside = hn::And(hn::And(hn::Gt(z, zero), hn::And(hn::Ge(u, zero), hn::Ge(v, zero))),
+                                       hn::And(hn::Lt(u, width), hn::Lt(v, height)));
       const auto index = hn::Add(hn::Mul(hn::ConvertTo(kI, v), row_length), hn::ConvertTo(kI, u));
-      const auto pixel = hn::IfThenElseZero(hn::RebindMask(kI, valid), index);
-      const FloatVec d = hn::GatherIndex(kF, view.depth_m, pixel);
-      FloatVec sdf = hn::Sub(d, z);
-      valid = hn::And(valid, hn::And(hn::Ge(d, nearest), hn::Le(d, farthest)));
-      if constexpr (kScaled) {
-        const FloatVec scale = hn::GatherIndex(kF, view.scale, pixel);
-        valid = hn::And(valid, hn::Gt(scale, zero));
-        sdf = hn::Mul(sdf, scale);
-      }
-      valid = hn::And(valid, hn::And(hn::Gt(sdf, minus_truncation), hn::Lt(sdf, sdf_limit)));
-      store_bits(valid, i, out.valid);
-      if (hn::AllFalse(kF, valid)) continue;
-      any = true;
-      FloatVec weight = observation_weight<kModel>(d);
-      const FloatVec falling = hn::Mul(weight, hn::Mul(hn::Add(sdf, truncation), dropoff_slope));
-      weight = hn::IfThenElse(hn::Lt(sdf, dropoff_start), falling, weight);
-      hn::Store(hn::Min(sdf, truncation), kF, out.sdf_m + i);
-      hn::Store(weight, kF, out.weight + i);
-      hn::Store(pixel, kI, out.pixel + i);
+      in_view = in_view || !hn::AllFalse(kF, inside);
+      store_bits(inside, i, out.valid);
+      hn::Store(z, kF, out.sdf_m + i);
+      hn::Store(hn::IfThenElseZero(hn::RebindMask(kI, inside), index), kI, out.pixel + i);
     }
+  }
+  if (!in_view) return false;
+  alignas(64) float depth_m[kBlockVoxels];
+  alignas(64) float scales[kScaled ? kBlockVoxels : 1];
+  fetch_pixels(view.depth_m, out.pixel, kBlockVoxels, depth_m);
+  if constexpr (kScaled) fetch_pixels(view.scale, out.pixel, kBlockVoxels, scales);
+
+  bool any = false;
+  for (int i = 0; i < kBlockVoxels; i += lanes) {
+    const FloatVec d = hn::Load(kF, depth_m + i);
+    FloatVec sdf = hn::Sub(d, hn::Load(kF, out.sdf_m + i));
+    FloatMask valid = hn::And(load_bits(out.valid, i), hn::And(hn::Ge(d, nearest), hn::Le(d, farthest)));
+    if constexpr (kScaled) {
+      const FloatVec scale = hn::Load(kF, scales + i);
+      valid = hn::And(valid, hn::Gt(scale, zero));
+      sdf = hn::Mul(sdf, scale);
+    }
+    valid = hn::And(valid, hn::And(hn::Gt(sdf, minus_truncation), hn::Lt(sdf, sdf_limit)));
+    store_bits(valid, i, out.valid);
+    if (hn::AllFalse(kF, valid)) continue;
+    any = true;
+    FloatVec weight = observation_weight<kModel>(d);
+    const FloatVec falling = hn::Mul(weight, hn::Mul(hn::Add(sdf, truncation), dropoff_slope));
+    weight = hn::IfThenElse(hn::Lt(sdf, dropoff_start), falling, weight);
+    hn::Store(hn::Min(sdf, truncation), kF, out.sdf_m + i);
+    hn::Store(weight, kF, out.weight + i);
   }
   return any;
 }
@@ -162,14 +190,21 @@ HWY_INLINE void average_color(FloatMask take, FloatVec byte, FloatVec share, uin
 void fuse_color(const BlockObservation& observation, const uint32_t* rgba, float band_m, ColorPlanes& planes) {
   const FloatVec band = hn::Set(kF, band_m), one = hn::Set(kF, 1.0f), top = hn::Set(kF, float(kMaxColorCount));
   const auto byte_mask = hn::Set(kI, 0xff);
-  const auto* pixels = reinterpret_cast<const int32_t*>(rgba);
-  for (int i = 0; i < kBlockVoxels; i += int(hn::Lanes(kF))) {
+  const int lanes = int(hn::Lanes(kF));
+  // First fetch, then average: a vector load right behind the stores it depends on would stall.
+  alignas(64) int32_t pixels[kBlockVoxels];
+  int todo[kBlockVoxels], count_todo = 0;
+  for (int i = 0; i < kBlockVoxels; i += lanes) {
     if (!any_bits(observation.valid, i)) continue;
+    fetch_pixels(reinterpret_cast<const int32_t*>(rgba), observation.pixel + i, lanes, pixels + i);
+    todo[count_todo++] = i;
+  }
+  for (int n = 0; n < count_todo; ++n) {
+    const int i = todo[n];
     const FloatMask take =
         hn::And(load_bits(observation.valid, i), hn::Lt(hn::Abs(hn::Load(kF, observation.sdf_m + i)), band));
     if (hn::AllFalse(kF, take)) continue;
-    const auto index = hn::IfThenElseZero(hn::RebindMask(kI, take), hn::Load(kI, observation.pixel + i));
-    const auto pixel = hn::GatherIndex(kI, pixels, index);
+    const auto pixel = hn::Load(kI, pixels + i);
     const FloatVec old_count = hn::ConvertTo(kF, hn::PromoteTo(kI, hn::Load(kU16, planes.count + i)));
     const FloatVec count = hn::Min(hn::Add(old_count, one), top);
     const FloatVec share = hn::Div(one, count);
@@ -186,12 +221,14 @@ void mark_cells_in_row(const AllocationView& view, int v, uint8_t* cells) {
   const float* row = view.depth_m + size_t(v) * view.width;
   const FloatVec zero = hn::Zero(kF);
   const FloatVec nearest = hn::Set(kF, view.min_depth_m), farthest = hn::Set(kF, view.max_depth_m);
-  const auto width = hn::Set(kI, view.width), last = hn::Set(kI, view.width - 1);
+  const auto width = hn::Set(kI, view.width);
   alignas(64) int32_t index[16];
+  alignas(64) float sampled_m[16];
   for (int u0 = 0; u0 < view.width; u0 += lanes * view.stride) {
     const auto u = hn::Add(hn::Mul(hn::Iota(kI, 0), hn::Set(kI, view.stride)), hn::Set(kI, u0));
     const auto in_row = hn::RebindMask(kF, hn::Lt(u, width));
-    const FloatVec d = hn::GatherIndex(kF, row, hn::Min(u, last));
+    for (int lane = 0; lane < lanes; ++lane) sampled_m[lane] = row[HWY_MIN(u0 + lane * view.stride, view.width - 1)];
+    const FloatVec d = hn::Load(kF, sampled_m);
     const FloatMask usable = hn::And(in_row, hn::And(hn::Ge(d, nearest), hn::Le(d, farthest)));
     if (hn::AllFalse(kF, usable)) continue;
     const FloatVec uf = hn::ConvertTo(kF, u);

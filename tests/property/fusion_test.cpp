@@ -62,6 +62,7 @@ TEST_CASE("every SIMD target fuses the scalar version's bits") {
         const BlockCoord coord{int(random.between(-4, 4)), int(random.between(-4, 4)), int(random.between(4, 14))};
         BlockObservation expected, found;
         const bool any = observe_block_scalar(coord, view, expected);
+        CAPTURE(target, variant);
         REQUIRE(observe_block(coord, view, found) == any);
         REQUIRE(std::memcmp(expected.valid, found.valid, sizeof found.valid) == 0);
         GeometryPlanes planes, planes_scalar;
