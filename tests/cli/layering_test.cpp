@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/data.h"
+
 namespace felt::test {
 namespace {
 namespace fs = std::filesystem;
@@ -19,7 +21,7 @@ struct Include {
 
 std::vector<Include> includes_below(const std::string& module) {
   static const std::regex directive(R"re(^\s*#\s*include\s*[<"]([^>"]+)[>"])re");
-  const fs::path root = FELTMAP_SOURCE_DIR;
+  const fs::path root = felt::test::source_dir();
   std::vector<Include> found;
   for (const auto& entry : fs::recursive_directory_iterator(root / module)) {
     const std::string extension = entry.path().extension();

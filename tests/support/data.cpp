@@ -15,6 +15,9 @@ std::optional<fs::path> recorded(const std::string& name) {
   return folder;
 }
 
+fs::path source_dir() { return FELTMAP_SOURCE_DIR; }
+fs::path command() { return FELTMAP_COMMAND; }
+
 TemporaryDirectory::TemporaryDirectory() {
   std::string pattern = (fs::temp_directory_path() / "feltmap-test-XXXXXX").string();
   if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("cannot make a temporary directory " + pattern);

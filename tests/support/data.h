@@ -10,6 +10,10 @@ namespace felt::test {
 /// is absent: use `FELTMAP_REQUIRE_DATA` so that ctest reports the test as skipped.
 std::optional<std::filesystem::path> recorded(const std::string& name);
 
+/// Root of the project's sources, and the built `feltmap` command.
+std::filesystem::path source_dir();
+std::filesystem::path command();
+
 /// An empty directory of this test's own, removed when the object goes.
 class TemporaryDirectory {
 public:
