@@ -1,6 +1,7 @@
 #include "mapping/marching_cubes_table.h"
 
 #include <cassert>
+#include <cstddef>
 #include <utility>
 #include <vector>
 

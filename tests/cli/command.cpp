@@ -22,7 +22,7 @@ std::string file_text(const std::filesystem::path& file) {
 CommandResult run_feltmap(const std::string& arguments) {
   const TemporaryDirectory directory;
   const auto out = directory.path() / "out", err = directory.path() / "err";
-  const std::string line = "'" + felt::test::command().string() + "' " + arguments + " < /dev/null > '" + out.string() +
+  const std::string line = felt::test::command().string() + " " + arguments + " < /dev/null > '" + out.string() +
                            "' 2> '" + err.string() + "'";
   const int status = std::system(line.c_str());
   CommandResult result;
