@@ -1,5 +1,5 @@
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "inference/batch_functions_simd.cpp"
+#define HWY_TARGET_INCLUDE "inference/batch_functions_kernels_simd.cpp"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
@@ -7,7 +7,7 @@
 
 #include "core/simd.h"
 #include "inference/batch_functions.h"
-#include "inference/batch_functions_scalar.h"
+#include "inference/batch_functions_kernels.h"
 #include "inference/batch_math-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -1,4 +1,4 @@
-#include "inference/batch_functions_scalar.h"
+#include "inference/batch_functions_kernels.h"
 
 #include <algorithm>
 #include <cmath>
