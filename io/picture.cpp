@@ -1,0 +1,65 @@
+#include "io/picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "core/error.h"
+#include "io/atomic_file.h"
+#include "mapping/mesh_raster.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+void write_encoded(const fs::path& path, const cv::Mat& pixels) {
+  std::vector<uchar> bytes;
+  if (!cv::imencode(".png", pixels, bytes)) throw IoError(path.string() + ": cannot encode as PNG");
+  AtomicFile file(path);
+  file.write(bytes.data(), bytes.size());
+  file.commit();
+}
+
+void paste(const ColorImage& panel, ColorImage& picture, int u0, int v0) {
+  for (int v = 0; v < panel.height(); ++v) std::copy_n(panel.row(v), panel.width(), picture.row(v0 + v) + u0);
+}
+
+}  // namespace
+
+void write_png(const fs::path& path, const ColorImage& image) {
+  const cv::Mat rgba(image.height(), image.width(), CV_8UC4, const_cast<Rgba8*>(image.data()));
+  cv::Mat bgr;
+  cv::cvtColor(rgba, bgr, cv::COLOR_RGBA2BGR);
+  write_encoded(path, bgr);
+}
+
+void write_depth_png(const fs::path& path, const DepthImage& depth_m, double metres_per_step) {
+  cv::Mat steps(depth_m.height(), depth_m.width(), CV_16UC1);
+  for (int v = 0; v < depth_m.height(); ++v)
+    for (int u = 0; u < depth_m.width(); ++u) {
+      const double s = std::round(depth_m(u, v) / metres_per_step);
+      steps.at<uint16_t>(v, u) = s >= 1 && s <= 65535 ? uint16_t(s) : uint16_t(0);
+    }
+  write_encoded(path, steps);
+}
+
+ColorImage overview_picture(const TriangleMesh& mesh, const Eigen::Vector3d& up, int panel_width, int panel_height) {
+  struct Direction {
+    double azimuth_deg, elevation_deg;
+  };
+  constexpr Direction kDirections[] = {{-60, 40}, {120, 40}, {-90, 90}};
+  std::vector<Shading> shadings = {Shading::clay, Shading::normal};
+  if (!mesh.colors.empty()) shadings.insert(shadings.begin(), Shading::color);
+  ColorImage picture(panel_width * int(std::size(kDirections)), panel_height * int(shadings.size()));
+  for (int column = 0; column < int(std::size(kDirections)); ++column) {
+    const auto [azimuth, elevation] = kDirections[column];
+    const RasterView view = overview(mesh, up, azimuth, elevation, panel_width, panel_height);
+    for (int row = 0; row < int(shadings.size()); ++row)
+      paste(draw_mesh(mesh, view, shadings[size_t(row)]), picture, column * panel_width, row * panel_height);
+  }
+  return picture;
+}
+
+}  // namespace felt

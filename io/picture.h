@@ -1,0 +1,22 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <span>
+
+#include "core/image.h"
+#include "core/mesh.h"
+
+namespace felt {
+
+/// Writes an 8-bit RGB PNG, whole or not at all; throws IoError.
+void write_png(const std::filesystem::path& path, const ColorImage& image);
+/// Writes a 16-bit grey PNG: depth in steps of `metres_per_step`, 0 where there is none or it does not fit.
+void write_depth_png(const std::filesystem::path& path, const DepthImage& depth_m, double metres_per_step = 0.001);
+
+/// A picture of a whole mesh without a display: two views from above at an angle and one straight down, each in
+/// colour (where the mesh has any), as grey clay, and by normal; walls towards the viewer are left out.
+ColorImage overview_picture(const TriangleMesh& mesh, const Eigen::Vector3d& up, int panel_width = 640,
+                            int panel_height = 480);
+
+}  // namespace felt
