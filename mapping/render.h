@@ -1,0 +1,62 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <limits>
+#include <optional>
+
+#include "core/camera.h"
+#include "core/image.h"
+#include "mapping/block_index.h"
+#include "mapping/map.h"
+
+namespace felt {
+
+struct RenderOptions {
+  double min_depth_m = 0.05;  ///< along the optical axis
+  double max_depth_m = 10;
+  bool normals = true;
+  bool color = true;
+};
+
+/// A voxel of a map: what a pixel shows of class and property planes.
+struct VoxelRef {
+  uint32_t block = BlockStore::kNone;  ///< number in the store; kNone: the ray met nothing
+  uint16_t offset = 0;                 ///< in the block
+};
+
+/// What a camera would see of a map. Every image has the camera's size.
+struct RenderedView {
+  DepthImage depth_m;             ///< along the optical axis, 0 where the ray met nothing
+  Image<Eigen::Vector3f> normal;  ///< unit, world frame; zero where there is none. Empty unless asked for
+  ColorImage color;               ///< a = 0 where there is none. Empty unless asked for
+  Image<VoxelRef> voxel;          ///< the voxel nearest to the surface point
+};
+
+/// Ray casting through the blocks of a map, which must outlive the caster and not change meanwhile.
+///
+/// A ray steps over absent blocks and over blocks far in front of the surface, marches through the others by the
+/// stored distance, and stops where the trilinear signed distance passes from positive to negative between points
+/// whose eight voxels were all observed: the surface that `extract_mesh` gives, seen from its front. The crossing is
+/// refined by regula falsi (Illinois) until the step is below 1/1000 voxel. As the stored distance is projective it
+/// can exceed the true one: a step is at most half of it.
+class RayCaster {
+public:
+  explicit RayCaster(const Map& map, float min_weight = 1e-6f);
+
+  /// Parallel over tiles; the same for any number of threads.
+  RenderedView render(const PinholeCamera& camera, const Eigen::Isometry3d& T_world_camera,
+                      const RenderOptions& options = {}) const;
+
+  /// First front-facing surface point along origin + s * direction (world, metres), s in (s_min, s_max): s, or nothing.
+  std::optional<double> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double s_min,
+                             double s_max) const;
+
+private:
+  class Sampler;
+
+  const Map& map_;
+  float min_weight_;
+  BlockIndex index_;
+};
+
+}  // namespace felt
