@@ -76,15 +76,32 @@ public:
 
   /// Trilinear signed distance in voxels, NaN where one of the eight voxels was not observed.
   double distance(const Vector3d& p) {
-    Corners c;
-    if (!corners(p, c)) return kNothing;
     float d[8];
-    for (int i = 0; i < 8; ++i) {
-      const GeometryPlanes& planes = *store_[c.voxel[i].block].geometry;
-      if (planes.weight[c.voxel[i].offset] < min_weight_) return kNothing;
-      d[i] = planes.tsdf[c.voxel[i].offset];
+    const Index3 base = floor_index(p);
+    const float fx = float(p.x() - base.x), fy = float(p.y() - base.y), fz = float(p.z() - base.z);
+    if ((base.x & 7) < 7 && (base.y & 7) < 7 && (base.z & 7) < 7) {
+      // Two of three cells lie within one block.
+      const uint32_t block = find(block_of_voxel(base));
+      if (block == BlockIndex::kNone) return kNothing;
+      const int offset = offset_in_block(base);
+      const float* tsdf = store_[block].geometry->tsdf + offset;
+      const float* weight = store_[block].geometry->weight + offset;
+      bool observed = true;
+      for (int c = 0; c < 8; ++c) {
+        const int v = voxel_offset(c >> 2, c >> 1 & 1, c & 1);
+        observed &= weight[v] >= min_weight_;
+        d[c] = tsdf[v];
+      }
+      if (!observed) return kNothing;
+    } else {
+      Corners c;
+      if (!corners(p, c)) return kNothing;
+      for (int i = 0; i < 8; ++i) {
+        const GeometryPlanes& planes = *store_[c.voxel[i].block].geometry;
+        if (planes.weight[c.voxel[i].offset] < min_weight_) return kNothing;
+        d[i] = planes.tsdf[c.voxel[i].offset];
+      }
     }
-    const auto [fx, fy, fz] = c.fraction;
     const float d00 = d[0] + fz * (d[1] - d[0]), d01 = d[2] + fz * (d[3] - d[2]);
     const float d10 = d[4] + fz * (d[5] - d[4]), d11 = d[6] + fz * (d[7] - d[6]);
     const float d0 = d00 + fy * (d01 - d00), d1 = d10 + fy * (d11 - d10);
@@ -97,16 +114,21 @@ public:
     return planes.weight[offset] < min_weight_ ? kNothing : double(planes.tsdf[offset] * per_voxel_);
   }
 
-  /// Unit gradient of the trilinear distance: central differences over a voxel to each side, one-sided where only that
-  /// side was observed.
+  /// Unit gradient of the trilinear distance, zero where there is none: from the four corners of a tetrahedron around
+  /// the point; at the limit of what was observed from differences along the axes, one-sided where need be.
   Vector3f normal(const Vector3d& p) {
-    const double here = distance(p);
-    Vector3d gradient;
-    for (int axis = 0; axis < 3; ++axis) {
-      double high = distance(p + Vector3d::Unit(axis)), low = distance(p - Vector3d::Unit(axis)), span = 2;
-      if (std::isnan(high)) high = here, span -= 1;
-      if (std::isnan(low)) low = here, span -= 1;
-      gradient[axis] = span > 0 ? (high - low) / span : 0;
+    constexpr double kReach = 0.75;
+    Vector3d gradient = Vector3d::Zero();
+    for (const Vector3d& corner : {Vector3d(1, 1, 1), Vector3d(1, -1, -1), Vector3d(-1, 1, -1), Vector3d(-1, -1, 1)})
+      gradient += corner * distance(p + kReach * corner);
+    if (!gradient.allFinite()) {
+      const double here = distance(p);
+      for (int axis = 0; axis < 3; ++axis) {
+        double high = distance(p + Vector3d::Unit(axis)), low = distance(p - Vector3d::Unit(axis)), span = 2;
+        if (std::isnan(high)) high = here, span -= 1;
+        if (std::isnan(low)) low = here, span -= 1;
+        gradient[axis] = span > 0 ? (high - low) / span : 0;
+      }
     }
     const double norm = gradient.norm();
     return norm > 1e-6 ? Vector3f((gradient / norm).cast<float>()) : Vector3f(Vector3f::Zero());
