@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "io/simulation/random.h"
+#include "io/simulation/shape_cast.h"
 #include "io/simulation/texture.h"
 
 namespace felt {
@@ -14,83 +15,28 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kTile = 16;              // pixels: a tile tests only the solids whose image rectangle it meets
-constexpr double kOcclusion_m = 0.12;  // contact shading: clearance in front of a point below which it gets less light
-
-struct ShapeHit {
-  double t = HUGE_VAL;
-  Vector3d normal = Vector3d::Zero();  // shape frame
-};
-
-/// First crossing from outside at t > 0 of a ray o + t d in the shape's frame; t infinite where it misses.
-ShapeHit cast_at_shape(ShapeKind shape, const Vector3d& half, const Vector3d& o, const Vector3d& d) {
-  ShapeHit hit;
-  switch (shape) {
-    case ShapeKind::plane:
-      if (d.z() < 0 && o.z() > 0) hit = {-o.z() / d.z(), Vector3d::UnitZ()};
-      break;
-    case ShapeKind::box: {
-      double near = -HUGE_VAL, far = HUGE_VAL;
-      int axis = 0;
-      for (int i = 0; i < 3; ++i) {
-        // A ray inside a face's plane gives 0 * inf = NaN, which the comparisons below pass over.
-        const double inverse = 1 / d[i], a = (-half[i] - o[i]) * inverse, b = (half[i] - o[i]) * inverse;
-        const double enter = std::min(a, b);
-        if (enter > near) near = enter, axis = i;
-        far = std::min(far, std::max(a, b));
-      }
-      if (near > 0 && near <= far) {
-        hit.t = near;
-        hit.normal[axis] = d[axis] < 0 ? 1 : -1;
-      }
-      break;
-    }
-    case ShapeKind::sphere: {
-      const double a = d.squaredNorm(), b = o.dot(d), c = o.squaredNorm() - half.x() * half.x(), disc = b * b - a * c;
-      if (c > 0 && b < 0 && disc >= 0) {
-        hit.t = c / (-b + std::sqrt(disc));  // the stable form of (-b - sqrt) / a
-        hit.normal = (o + hit.t * d).normalized();
-      }
-      break;
-    }
-    case ShapeKind::cylinder: {
-      const double r = half.x(), h = half.z();
-      const double cap = d.z() < 0 ? h : -h, t_cap = (cap - o.z()) / d.z();
-      if (t_cap > 0 && t_cap < HUGE_VAL) {
-        const double x = o.x() + t_cap * d.x(), y = o.y() + t_cap * d.y();
-        if (x * x + y * y <= r * r && std::abs(o.z()) > h) return {t_cap, Vector3d(0, 0, cap > 0 ? 1 : -1)};
-      }
-      const double a = d.x() * d.x() + d.y() * d.y(), b = o.x() * d.x() + o.y() * d.y();
-      const double c = o.x() * o.x() + o.y() * o.y() - r * r, disc = b * b - a * c;
-      if (c > 0 && b < 0 && disc >= 0) {
-        const double t = c / (-b + std::sqrt(disc)), z = o.z() + t * d.z();
-        if (std::abs(z) <= h) hit = {t, Vector3d((o.x() + t * d.x()) / r, (o.y() + t * d.y()) / r, 0)};
-      }
-      break;
-    }
-  }
-  return hit;
-}
+// Pixels: a tile tests only the solids whose image rectangle it meets.
+constexpr int kTile = RaySpan::kWidth;
+// Contact shading: clearance in front of a point below which it gets less light.
+constexpr double kOcclusion_m = 0.12;
 
 /// A solid as one camera sees it.
 struct SeenPrimitive {
   int index;
   Eigen::Matrix3d R_shape_camera;
-  Vector3d origin;        // camera centre, shape frame
-  double nearest_m;       // no point of it has a smaller depth
-  Eigen::Array4i rect;    // u0, v0, u1, v1 (inclusive) of its image, conservative
-  Eigen::Array4i around;  // same of the solid grown by the reach of contact shading
+  Vector3d origin;      // camera centre, shape frame
+  double nearest_m;     // no point of it has a smaller depth
+  Eigen::Array4i rect;  // u0, v0, u1, v1 (inclusive) of its image, conservative
 };
 
-/// Image rectangle of an oriented box grown by `margin_m`; everything where it reaches behind the camera; empty where
-/// it is behind altogether.
+/// Image rectangle of an oriented box: everything where it reaches behind the camera, u1 < u0 where it is out of view.
 Eigen::Array4i image_rect(const PinholeCamera& camera, const Eigen::Isometry3d& T_camera_shape, const Vector3d& half,
-                          double margin_m, double& nearest_m) {
+                          double& nearest_m) {
   const Eigen::Array4i all{0, 0, camera.width - 1, camera.height - 1}, none{0, 0, -1, -1};
   double u0 = HUGE_VAL, v0 = HUGE_VAL, u1 = -HUGE_VAL, v1 = -HUGE_VAL, z0 = HUGE_VAL, z1 = -HUGE_VAL;
   for (int corner = 0; corner < 8; ++corner) {
     const Vector3d sign((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1, (corner & 4) != 0 ? 1 : -1);
-    const Vector3d p = T_camera_shape * Vector3d(sign.array() * (half.array() + margin_m));
+    const Vector3d p = T_camera_shape * Vector3d(sign.array() * half.array());
     z0 = std::min(z0, p.z()), z1 = std::max(z1, p.z());
     if (p.z() <= 1e-3) continue;
     const Eigen::Vector2d uv = camera.project(p);
@@ -110,17 +56,15 @@ std::vector<SeenPrimitive> seen_primitives(const Scene& scene, const PinholeCame
   for (size_t i = 0; i < scene.primitives.size(); ++i) {
     const Primitive& p = scene.primitives[i];
     const Eigen::Isometry3d T_shape_camera = p.T_world_shape.inverse() * T_world_camera;
-    SeenPrimitive s{int(i), T_shape_camera.linear(), T_shape_camera.translation(), 0, {}, {}};
+    SeenPrimitive s{int(i), T_shape_camera.linear(), T_shape_camera.translation(), 0, {}};
     if (p.shape == ShapeKind::plane) {
-      s.rect = s.around = {0, 0, camera.width - 1, camera.height - 1};
+      s.rect = {0, 0, camera.width - 1, camera.height - 1};
     } else {
       Vector3d half = p.half_size_m;
       if (p.shape == ShapeKind::sphere) half = Vector3d::Constant(half.x());
       if (p.shape == ShapeKind::cylinder) half.y() = half.x();
-      double nearest_grown_m = 0;
-      s.around = image_rect(camera, T_shape_camera.inverse(), half, 2 * kOcclusion_m, nearest_grown_m);
-      s.rect = image_rect(camera, T_shape_camera.inverse(), half, 0, s.nearest_m);
-      if (s.around[2] < 0) continue;
+      s.rect = image_rect(camera, T_shape_camera.inverse(), half, s.nearest_m);
+      if (s.rect[2] < 0) continue;
     }
     seen.push_back(s);
   }
@@ -135,12 +79,12 @@ bool meets(const Eigen::Array4i& rect, int u0, int v0, int u1, int v1) {
 }
 
 /// Share of ambient light that reaches a point, from how close the nearest other solid is in front of it.
-float open_sky(const Scene& scene, const std::vector<const SeenPrimitive*>& around, const Vector3d& p_world,
-               const Vector3d& normal, int own) {
+float open_sky(const Scene& scene, const std::vector<int>& around, const Vector3d& p_world, const Vector3d& normal,
+               int own) {
   const Vector3d probe = p_world + kOcclusion_m * normal;
   double nearest_m = kOcclusion_m;
-  for (const SeenPrimitive* s : around)
-    if (s->index != own) nearest_m = std::min(nearest_m, signed_distance_m(scene.primitives[s->index], probe));
+  for (const int i : around)
+    if (i != own) nearest_m = std::min(nearest_m, signed_distance_m(scene.primitives[i], probe));
   const float open = float(std::max(nearest_m, 0.0) / kOcclusion_m);
   return 0.55f + 0.45f * open;
 }
@@ -159,6 +103,60 @@ Rgba8 shade(const Scene& scene, const Primitive& primitive, const Vector3d& p_wo
   const float fill = float(0.42 + 0.13 * normal.z() + 0.06 * normal.x() - 0.04 * normal.y());
   const Eigen::Vector3f lit = albedo * (sky * (fill + 0.62f * lamp));
   return {srgb_byte(lit.x()), srgb_byte(lit.y()), srgb_byte(lit.z()), 255};
+}
+
+/// What a tile's pixels hit.
+struct Tile {
+  int u0, v0, u1, v1;  // inclusive
+  RaySpan rows[kTile];
+};
+
+void cast_tile(const Scene& scene, const PinholeCamera& camera, const std::vector<SeenPrimitive>& seen, Tile& tile) {
+  std::vector<const SeenPrimitive*> candidates;
+  for (const SeenPrimitive& s : seen)
+    if (meets(s.rect, tile.u0, tile.v0, tile.u1, tile.v1)) candidates.push_back(&s);
+  double x[kTile];
+  for (int i = 0; i < kTile; ++i) x[i] = camera.ray(tile.u0 + i, 0).x();
+  for (int v = tile.v0; v <= tile.v1; ++v) {
+    RaySpan& span = tile.rows[v - tile.v0];
+    span.y = camera.ray(0, v).y();
+    std::copy(x, x + kTile, span.x);
+    std::fill(span.t, span.t + kTile, HUGE_VAL);
+    std::fill(span.nearest, span.nearest + kTile, -1);
+    double farthest_m = HUGE_VAL;  // no hit of the span is farther; renewed now and then
+    for (size_t i = 0; i < candidates.size(); ++i) {
+      const SeenPrimitive& s = *candidates[i];
+      if (i % 4 == 3) farthest_m = *std::max_element(span.t, span.t + kTile);
+      if (s.nearest_m > farthest_m) break;
+      cast_span_at_shape(scene.primitives[s.index], s.R_shape_camera, s.origin, s.index, span);
+    }
+  }
+}
+
+/// Calls `visit(u, v, primitive, depth, ray)` for every pixel of the tile that hit something.
+template <typename Visit>
+void for_each_hit(const Tile& tile, const Visit& visit) {
+  for (int v = tile.v0; v <= tile.v1; ++v) {
+    const RaySpan& span = tile.rows[v - tile.v0];
+    for (int u = tile.u0; u <= tile.u1; ++u) {
+      const int i = u - tile.u0;
+      if (span.nearest[i] >= 0) visit(u, v, span.nearest[i], span.t[i], Vector3d(span.x[i], span.y, 1));
+    }
+  }
+}
+
+/// The solids that contact shading of the tile's pixels can meet.
+std::vector<int> solids_around(const Scene& scene, const Tile& tile, const Eigen::Isometry3d& T_world_camera) {
+  Eigen::AlignedBox3d hits;
+  for_each_hit(tile, [&](int, int, int, double depth_m, const Vector3d& ray) {
+    hits.extend(T_world_camera * Vector3d(depth_m * ray));
+  });
+  std::vector<int> around;
+  if (hits.isEmpty()) return around;
+  const double reach_m = hits.diagonal().norm() / 2 + 2 * kOcclusion_m;
+  for (size_t i = 0; i < scene.primitives.size(); ++i)
+    if (signed_distance_m(scene.primitives[i], hits.center()) < reach_m) around.push_back(int(i));
+  return around;
 }
 
 }  // namespace
@@ -186,46 +184,32 @@ SceneView render_view(const Scene& scene, const PinholeCamera& camera, const Eig
                  LabelImage(w, h), LabelImage(w, h),   LabelImage(w, h)};
   if (with_color) view.color = ColorImage(w, h, Rgba8{0, 0, 0, 255});
   const std::vector<SeenPrimitive> seen = seen_primitives(scene, camera, T_world_camera);
+  std::vector<int> place_in_seen(scene.primitives.size(), -1);
+  for (size_t i = 0; i < seen.size(); ++i) place_in_seen[seen[i].index] = int(i);
   const int tiles_x = (w + kTile - 1) / kTile, tiles_y = (h + kTile - 1) / kTile;
 
-  const auto render_tile = [&](int tile) {
-    const int u0 = tile % tiles_x * kTile, v0 = tile / tiles_x * kTile;
-    const int u1 = std::min(u0 + kTile, w) - 1, v1 = std::min(v0 + kTile, h) - 1;
-    std::vector<const SeenPrimitive*> candidates, around;
-    for (const SeenPrimitive& s : seen) {
-      if (s.rect[2] >= 0 && meets(s.rect, u0, v0, u1, v1)) candidates.push_back(&s);
-      if (with_color && meets(s.around, u0, v0, u1, v1)) around.push_back(&s);
-    }
-    for (int v = v0; v <= v1; ++v) {
-      for (int u = u0; u <= u1; ++u) {
-        const Vector3d ray = camera.ray(u, v);
-        ShapeHit best;
-        const SeenPrimitive* hit_by = nullptr;
-        for (const SeenPrimitive* s : candidates) {
-          if (s->nearest_m > best.t) break;
-          const Primitive& p = scene.primitives[s->index];
-          const ShapeHit hit = cast_at_shape(p.shape, p.half_size_m, s->origin, s->R_shape_camera * ray);
-          // Coplanar faces: the solid that comes first in the scene wins, whatever the order of the candidates.
-          if (hit.t < best.t || (hit.t == best.t && hit_by != nullptr && s->index < hit_by->index))
-            best = hit, hit_by = s;
-        }
-        if (hit_by == nullptr) continue;
-        const Primitive& p = scene.primitives[hit_by->index];
-        const size_t pixel = size_t(v) * w + u;
-        view.depth_m.data()[pixel] = float(best.t);
-        view.semantics.data()[pixel] = p.semantic;
-        view.materials.data()[pixel] = p.material;
-        view.instances.data()[pixel] = p.instance;
-        const Vector3d normal_camera = hit_by->R_shape_camera.transpose() * best.normal;
-        view.incidence_cos.data()[pixel] = float(std::abs(normal_camera.dot(ray)) / ray.norm());
-        if (with_color) {
-          const Vector3d p_world = T_world_camera * Vector3d(best.t * ray),
-                         normal = T_world_camera.linear() * normal_camera;
-          view.color.data()[pixel] =
-              shade(scene, p, p_world, normal, open_sky(scene, around, p_world, normal, hit_by->index));
-        }
-      }
-    }
+  const auto render_tile = [&](int number) {
+    Tile tile;
+    tile.u0 = number % tiles_x * kTile, tile.v0 = number / tiles_x * kTile;
+    tile.u1 = std::min(tile.u0 + kTile, w) - 1, tile.v1 = std::min(tile.v0 + kTile, h) - 1;
+    cast_tile(scene, camera, seen, tile);
+    const std::vector<int> around = with_color ? solids_around(scene, tile, T_world_camera) : std::vector<int>();
+    for_each_hit(tile, [&](int u, int v, int hit_by, double depth_m, const Vector3d& ray) {
+      const Primitive& p = scene.primitives[hit_by];
+      const SeenPrimitive& s = seen[place_in_seen[hit_by]];
+      const Vector3d normal_shape = cast_at_shape(p.shape, p.half_size_m, s.origin, s.R_shape_camera * ray).normal;
+      const Vector3d normal_camera = s.R_shape_camera.transpose() * normal_shape;
+      const size_t pixel = size_t(v) * w + u;
+      view.depth_m.data()[pixel] = float(depth_m);
+      view.semantics.data()[pixel] = p.semantic;
+      view.materials.data()[pixel] = p.material;
+      view.instances.data()[pixel] = p.instance;
+      view.incidence_cos.data()[pixel] = float(std::abs(normal_camera.dot(ray)) / ray.norm());
+      if (!with_color) return;
+      const Vector3d p_world = T_world_camera * Vector3d(depth_m * ray),
+                     normal = T_world_camera.linear() * normal_camera;
+      view.color.data()[pixel] = shade(scene, p, p_world, normal, open_sky(scene, around, p_world, normal, hit_by));
+    });
   };
   tbb::parallel_for(tbb::blocked_range<int>(0, tiles_x * tiles_y), [&](const tbb::blocked_range<int>& range) {
     for (int tile = range.begin(); tile != range.end(); ++tile) render_tile(tile);
