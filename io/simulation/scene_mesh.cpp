@@ -10,6 +10,7 @@
 #include <string>
 
 #include "io/atomic_file.h"
+#include "io/simulation/convex_clip.h"
 
 namespace felt {
 namespace {
@@ -18,166 +19,187 @@ using Eigen::Vector3d;
 
 constexpr double kPi = std::numbers::pi;
 
-/// A smooth piece of a solid's surface over the parameters (u, v) in [0, 1]^2, in the shape's frame.
-struct Patch {
-  enum Kind : uint8_t { flat, sphere, cylinder_side, disc } kind = flat;
-  Vector3d origin = Vector3d::Zero(), along_u = Vector3d::Zero(), along_v = Vector3d::Zero();  // flat
-  double radius_m = 0, half_height_m = 0;                                                      // the others
-  double side = 1;  // disc: +1 the upper, -1 the lower cap
-  int pieces_u = 1, pieces_v = 1;
-
-  Vector3d point(double u, double v) const {
-    switch (kind) {
-      case flat:
-        return origin + u * along_u + v * along_v;
-      case sphere: {
-        const double longitude = 2 * kPi * u, latitude = kPi * (v - 0.5);
-        return radius_m * Vector3d(std::cos(latitude) * std::cos(longitude), std::cos(latitude) * std::sin(longitude),
-                                   std::sin(latitude));
-      }
-      case cylinder_side:
-        return {radius_m * std::cos(2 * kPi * u), radius_m * std::sin(2 * kPi * u), half_height_m * (2 * v - 1)};
-      case disc: {
-        const double r = radius_m * (1 - v), angle = side * 2 * kPi * u;
-        return {r * std::cos(angle), r * std::sin(angle), side * half_height_m};
-      }
-    }
-    return origin;
-  }
-};
-
 int pieces_of_circle(double radius_m, double chord_error_m) {
   return std::max(12, int(std::ceil(kPi / std::acos(1 - std::min(0.5, chord_error_m / radius_m)))));
 }
 
-std::vector<Patch> patches_of(const Primitive& p, double chord_error_m) {
+Vector3d on_circle(double radius_m, int i, int n, double z) {
+  const double angle = 2 * kPi * (i % n) / n;
+  return {radius_m * std::cos(angle), radius_m * std::sin(angle), z};
+}
+
+std::vector<Polygon> box_faces(const Vector3d& half) {
+  std::vector<Polygon> faces;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double side : {-1.0, 1.0}) {
+      // The first edge cross the second points outward on both sides.
+      const int first = side > 0 ? (axis + 1) % 3 : (axis + 2) % 3, second = 3 - axis - first;
+      const Vector3d middle = side * half[axis] * Vector3d::Unit(axis), a = half[first] * Vector3d::Unit(first),
+                     b = half[second] * Vector3d::Unit(second);
+      faces.push_back({middle - a - b, middle + a - b, middle + a + b, middle - a + b});
+    }
+  }
+  return faces;
+}
+
+std::vector<Polygon> sphere_faces(double radius_m, int n) {
+  // Rings of latitude; at the poles two corners are one.
+  const int rings = (n + 1) / 2;
+  const auto corner = [&](int i, int ring) {
+    const double latitude = kPi * (double(ring) / rings - 0.5);
+    return on_circle(radius_m * std::cos(latitude), i, n, radius_m * std::sin(latitude));
+  };
+  std::vector<Polygon> faces;
+  for (int ring = 0; ring < rings; ++ring) {
+    for (int i = 0; i < n; ++i) {
+      Polygon face = {corner(i, ring)};
+      if (ring > 0) face.push_back(corner(i + 1, ring));
+      face.push_back(corner(i + 1, ring + 1));
+      if (ring + 1 < rings) face.push_back(corner(i, ring + 1));
+      faces.push_back(std::move(face));
+    }
+  }
+  return faces;
+}
+
+std::vector<Polygon> cylinder_faces(double radius_m, double half_height_m, int n) {
+  std::vector<Polygon> faces(2);
+  for (int i = 0; i < n; ++i) {
+    const Vector3d low = on_circle(radius_m, i, n, -half_height_m), high = on_circle(radius_m, i, n, half_height_m);
+    const Vector3d next_low = on_circle(radius_m, i + 1, n, -half_height_m),
+                   next_high = on_circle(radius_m, i + 1, n, half_height_m);
+    faces.push_back({low, next_low, next_high, high});
+    faces[0].push_back(on_circle(radius_m, n - i, n, -half_height_m));
+    faces[1].push_back(high);
+  }
+  return faces;
+}
+
+/// Faces of a solid in the world frame, counter-clockwise from outside.
+std::vector<Polygon> faces_of(const Primitive& p, double chord_error_m) {
   const Vector3d& half = p.half_size_m;
-  std::vector<Patch> patches;
+  std::vector<Polygon> faces;
   switch (p.shape) {
     case ShapeKind::plane:
-      patches.push_back({Patch::flat, {-half.x(), -half.y(), 0}, {2 * half.x(), 0, 0}, {0, 2 * half.y(), 0}});
+      faces = {
+          {{-half.x(), -half.y(), 0}, {half.x(), -half.y(), 0}, {half.x(), half.y(), 0}, {-half.x(), half.y(), 0}}};
       break;
     case ShapeKind::box:
-      for (int axis = 0; axis < 3; ++axis)
-        for (const double side : {-1.0, 1.0}) {
-          // u cross v points outward on both sides.
-          const int a = side > 0 ? (axis + 1) % 3 : (axis + 2) % 3, b = side > 0 ? (axis + 2) % 3 : (axis + 1) % 3;
-          Patch face;
-          face.origin =
-              side * half[axis] * Vector3d::Unit(axis) - half[a] * Vector3d::Unit(a) - half[b] * Vector3d::Unit(b);
-          face.along_u = 2 * half[a] * Vector3d::Unit(a);
-          face.along_v = 2 * half[b] * Vector3d::Unit(b);
-          patches.push_back(face);
-        }
+      faces = box_faces(half);
+      break;
+    case ShapeKind::sphere:
+      faces = sphere_faces(half.x(), pieces_of_circle(half.x(), chord_error_m));
+      break;
+    case ShapeKind::cylinder:
+      faces = cylinder_faces(half.x(), half.z(), pieces_of_circle(half.x(), chord_error_m));
+      break;
+  }
+  for (Polygon& face : faces)
+    for (Vector3d& corner : face) corner = p.T_world_shape * corner;
+  return faces;
+}
+
+Vector3d normal_of(const Polygon& face) {
+  Vector3d normal = Vector3d::Zero();
+  for (size_t i = 2; i < face.size(); ++i) normal += (face[i - 1] - face[0]).cross(face[i] - face[0]);
+  return normal.normalized();
+}
+
+/// The solid as half-spaces, as far as it meets the plane of a face: a sphere is cut there along a circle, which
+/// becomes a prism. Empty: it does not meet the plane.
+std::vector<HalfSpace> half_spaces(const Primitive& p, const Polygon& face, double chord_error_m) {
+  const Eigen::Matrix3d& R = p.T_world_shape.linear();
+  const Vector3d at = p.T_world_shape.translation(), &half = p.half_size_m;
+  std::vector<HalfSpace> all;
+  const auto add = [&](const Vector3d& normal, double distance_m) {
+    all.push_back({normal, normal.dot(at) + distance_m});
+  };
+  switch (p.shape) {
+    case ShapeKind::plane:
+      add(R.col(2), 0);
+      break;
+    case ShapeKind::box:
+      for (int axis = 0; axis < 3; ++axis) add(R.col(axis), half[axis]), add(-R.col(axis), half[axis]);
       break;
     case ShapeKind::sphere: {
-      const int n = pieces_of_circle(half.x(), chord_error_m);
-      Patch ball;
-      ball.kind = Patch::sphere, ball.radius_m = half.x(), ball.pieces_u = n, ball.pieces_v = (n + 1) / 2;
-      patches.push_back(ball);
+      const Vector3d normal = normal_of(face);
+      const double off_m = normal.dot(face[0] - at), squared = half.x() * half.x() - off_m * off_m;
+      if (squared <= 1e-12) break;
+      const int n = pieces_of_circle(std::sqrt(squared), chord_error_m);
+      const Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
+      for (int i = 0; i < n; ++i) {
+        const double angle = 2 * kPi * (i + 0.5) / n;
+        add(std::cos(angle) * u + std::sin(angle) * v, std::sqrt(squared) * std::cos(kPi / n));
+      }
       break;
     }
     case ShapeKind::cylinder: {
-      Patch part;
-      part.kind = Patch::cylinder_side, part.radius_m = half.x(), part.half_height_m = half.z();
-      part.pieces_u = pieces_of_circle(half.x(), chord_error_m);
-      patches.push_back(part);
-      part.kind = Patch::disc;
-      for (const double side : {-1.0, 1.0}) part.side = side, patches.push_back(part);
+      const int n = pieces_of_circle(half.x(), chord_error_m);
+      for (int i = 0; i < n; ++i) {
+        const double angle = 2 * kPi * (i + 0.5) / n;
+        add(R * Vector3d(std::cos(angle), std::sin(angle), 0), half.x() * std::cos(kPi / n));
+      }
+      add(R.col(2), half.z()), add(-R.col(2), half.z());
       break;
     }
   }
-  return patches;
+  return all;
 }
 
-/// Cuts patches into quadrilaterals that are visible as a whole.
-class Tessellator {
-public:
-  Tessellator(const Scene& scene, int own, const SceneMeshOptions& options, SceneMesh& mesh)
-      : scene_(scene), primitive_(scene.primitives[own]), options_(options), mesh_(mesh) {
-    for (size_t i = 0; i < scene.primitives.size(); ++i)
-      if (int(i) != own) others_.push_back(int(i));
+/// The face lies in a face of the other solid and looks the same way.
+bool shares_face(const Polygon& face, const std::vector<HalfSpace>& other) {
+  const Vector3d normal = normal_of(face);
+  return std::any_of(other.begin(), other.end(), [&](const HalfSpace& h) {
+    return h.normal.dot(normal) > 1 - 1e-9 && std::abs(h.signed_distance(face[0])) <= 1e-7;
+  });
+}
+
+std::vector<Polygon> visible_parts(const Scene& scene, size_t own, const Polygon& face, double chord_error_m) {
+  Polygon within = face;
+  for (int axis = 0; axis < 3 && !within.empty(); ++axis) {
+    within = clipped(within, {Vector3d::Unit(axis), scene.bounds.max()[axis]});
+    within = clipped(within, {-Vector3d::Unit(axis), -scene.bounds.min()[axis]});
   }
-
-  void add(const Patch& patch) {
-    for (int j = 0; j < patch.pieces_v; ++j)
-      for (int i = 0; i < patch.pieces_u; ++i)
-        cut(patch, double(i) / patch.pieces_u, double(i + 1) / patch.pieces_u, double(j) / patch.pieces_v,
-            double(j + 1) / patch.pieces_v);
+  if (within.empty()) return {};
+  Eigen::AlignedBox3d extent;
+  for (const Vector3d& corner : within) extent.extend(corner);
+  const double radius_m = extent.diagonal().norm() / 2;
+  std::vector<Polygon> parts = {within};
+  for (size_t i = 0; i < scene.primitives.size(); ++i) {
+    if (i == own || signed_distance_m(scene.primitives[i], extent.center()) > radius_m + chord_error_m) continue;
+    const std::vector<HalfSpace> other = half_spaces(scene.primitives[i], within, chord_error_m);
+    if (other.empty() || (i > own && shares_face(within, other))) continue;
+    std::vector<Polygon> left;
+    for (const Polygon& part : parts)
+      for (Polygon& piece : subtracted(part, other)) left.push_back(std::move(piece));
+    parts = std::move(left);
   }
+  return parts;
+}
 
-private:
-  Vector3d world(const Patch& patch, double u, double v) const { return primitive_.T_world_shape * patch.point(u, v); }
-
-  void cut(const Patch& patch, double u0, double u1, double v0, double v1) {
-    const Vector3d corners[4] = {world(patch, u0, v0), world(patch, u1, v0), world(patch, u1, v1),
-                                 world(patch, u0, v1)};
-    const Vector3d middle = world(patch, (u0 + u1) / 2, (v0 + v1) / 2);
-    double radius_m = 0;
-    Eigen::AlignedBox3d extent(middle);
-    for (const Vector3d& corner : corners) {
-      radius_m = std::max(radius_m, (corner - middle).norm());
-      extent.extend(corner);
-    }
-    // Outside of the bounds: nobody looks there. Faces of the bounds themselves belong to the scene.
-    constexpr double kSlack_m = 1e-9;
-    const Eigen::AlignedBox3d bounds(scene_.bounds.min() - Vector3d::Constant(kSlack_m),
-                                     scene_.bounds.max() + Vector3d::Constant(kSlack_m));
-    if (!bounds.intersects(extent)) return;
-    const double cover_m = distance_to_others(middle);
-    if (cover_m < -radius_m) return;
-    const bool whole = cover_m >= radius_m && bounds.contains(extent);
-    const double du = std::max((corners[1] - corners[0]).norm(), (corners[2] - corners[3]).norm());
-    const double dv = std::max((corners[3] - corners[0]).norm(), (corners[2] - corners[1]).norm());
-    if (whole || std::max(du, dv) <= options_.border_size_m) {
-      // A point in the plane of another solid's face is covered by that face.
-      if (whole || (cover_m > kSlack_m && bounds.contains(middle))) emit(corners);
-      return;
-    }
-    if (du >= dv) {
-      cut(patch, u0, (u0 + u1) / 2, v0, v1);
-      cut(patch, (u0 + u1) / 2, u1, v0, v1);
-    } else {
-      cut(patch, u0, u1, v0, (v0 + v1) / 2);
-      cut(patch, u0, u1, (v0 + v1) / 2, v1);
+SceneMesh visible_surface(const Scene& scene, size_t own, double chord_error_m) {
+  SceneMesh mesh;
+  const Primitive& p = scene.primitives[own];
+  for (const Polygon& face : faces_of(p, chord_error_m)) {
+    for (const Polygon& part : visible_parts(scene, own, face, chord_error_m)) {
+      const uint32_t first = uint32_t(mesh.vertices.size());
+      for (const Vector3d& corner : part) mesh.vertices.push_back(corner.cast<float>());
+      for (uint32_t i = 2; i < part.size(); ++i) {
+        mesh.triangles.push_back({first, first + i - 1, first + i});
+        mesh.semantic.push_back(p.semantic);
+        mesh.material.push_back(p.material);
+        mesh.instance.push_back(p.instance);
+      }
     }
   }
-
-  double distance_to_others(const Vector3d& p) const {
-    double nearest_m = HUGE_VAL;
-    for (const int i : others_) nearest_m = std::min(nearest_m, signed_distance_m(scene_.primitives[i], p));
-    return nearest_m;
-  }
-
-  void emit(const Vector3d* corners) {
-    const uint32_t first = uint32_t(mesh_.vertices.size());
-    for (int i = 0; i < 4; ++i) mesh_.vertices.push_back(corners[i].cast<float>());
-    for (const auto& [a, b, c] : {std::array<uint32_t, 3>{0, 1, 2}, {0, 2, 3}}) {
-      // At the poles of a sphere and the middle of a disc two corners are one.
-      const bool flat = (corners[b] - corners[a]).cross(corners[c] - corners[a]).norm() < 1e-14;
-      if (flat) continue;
-      mesh_.triangles.push_back({first + a, first + b, first + c});
-      mesh_.semantic.push_back(primitive_.semantic);
-      mesh_.material.push_back(primitive_.material);
-      mesh_.instance.push_back(primitive_.instance);
-    }
-  }
-
-  const Scene& scene_;
-  const Primitive& primitive_;
-  const SceneMeshOptions& options_;
-  SceneMesh& mesh_;
-  std::vector<int> others_;
-};
+  return mesh;
+}
 
 }  // namespace
 
-SceneMesh scene_mesh(const Scene& scene, const SceneMeshOptions& options) {
+SceneMesh scene_mesh(const Scene& scene, double chord_error_m) {
   std::vector<SceneMesh> parts(scene.primitives.size());
-  tbb::parallel_for(size_t(0), parts.size(), [&](size_t i) {
-    Tessellator tessellator(scene, int(i), options, parts[i]);
-    for (const Patch& patch : patches_of(scene.primitives[i], options.chord_error_m)) tessellator.add(patch);
-  });
+  tbb::parallel_for(size_t(0), parts.size(), [&](size_t i) { parts[i] = visible_surface(scene, i, chord_error_m); });
   SceneMesh mesh;
   for (const SceneMesh& part : parts) {
     const uint32_t first = uint32_t(mesh.vertices.size());

@@ -17,14 +17,11 @@ struct SceneMesh {
   std::vector<uint16_t> semantic, material, instance;  ///< per triangle
 };
 
-struct SceneMeshOptions {
-  double chord_error_m = 2e-4;   ///< curved surfaces: largest distance of a triangle from them
-  double border_size_m = 0.005;  ///< faces are cut up to this size where another solid or the scene's bounds cut them
-};
-
 /// The surface of the scene's union within its bounds: faces and parts of faces inside another solid, or outside of the
-/// bounds, are left out. Flat faces are exact but for a border of `border_size_m` where another solid cuts them.
-SceneMesh scene_mesh(const Scene& scene, const SceneMeshOptions& options = {});
+/// bounds, are left out. Where solids share a part of a face, the first of them keeps it. Flat surfaces are exact;
+/// spheres and cylinders are polyhedra with their corners on the surface, no point farther from it than
+/// `chord_error_m`.
+SceneMesh scene_mesh(const Scene& scene, double chord_error_m = 2e-4);
 
 /// Binary little-endian PLY; faces carry `uchar semantic`, `uchar material`, `ushort instance`. Throws IoError.
 void write_scene_mesh(const SceneMesh& mesh, const std::filesystem::path& file);

@@ -1,0 +1,283 @@
+#include "io/simulation/sequence_writer.h"
+
+#include <tbb/parallel_for.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "core/error.h"
+#include "io/atomic_file.h"
+#include "io/confusion_file.h"
+#include "io/image_encode.h"
+#include "io/property_yaml.h"
+#include "io/simulation/scene_file.h"
+#include "io/simulation/scene_mesh.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+std::string frame_name(size_t i, const char* extension) {
+  char name[32];
+  std::snprintf(name, sizeof name, "%06zu%s", i, extension);
+  return name;
+}
+
+template <typename... Values>
+std::string formatted(const char* format, Values... values) {
+  char text[512];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+/// A folder that takes its final name when it is whole, and disappears otherwise.
+class FolderInProgress {
+public:
+  FolderInProgress(const fs::path& destination, bool replace) : destination_(destination) {
+    if (destination_.filename().empty()) destination_ = destination_.parent_path();  // "name/" is "name"
+    const fs::path parent = destination_.has_parent_path() ? destination_.parent_path() : ".";
+    if (fs::exists(destination_) && !(replace && replaceable()))
+      throw IoError(describe_mismatch(destination_.string(), "output",
+                                      replace ? "an empty folder or a simulated sequence to replace"
+                                              : "a path that does not exist (--force replaces a simulated sequence)",
+                                      "something that exists"));
+    std::string pattern =
+        (parent / fs::path(".").concat(destination_.filename().string()).concat(".partial-XXXXXX")).string();
+    if (mkdtemp(pattern.data()) == nullptr)
+      throw IoError(parent.string() + ": a folder cannot be made in it: " + std::strerror(errno));
+    path_ = pattern;
+    fs::permissions(path_, fs::perms(0755));
+  }
+  ~FolderInProgress() {
+    std::error_code ignored;
+    if (!path_.empty()) fs::remove_all(path_, ignored);
+  }
+  FolderInProgress(const FolderInProgress&) = delete;
+  FolderInProgress& operator=(const FolderInProgress&) = delete;
+
+  const fs::path& path() const { return path_; }
+  void commit() {
+    if (!fs::exists(destination_)) {
+      fs::rename(path_, destination_);
+    } else {
+      // The old folder keeps its place until the new one is whole, and gets it back if the new one cannot take it.
+      const fs::path old = fs::path(path_).concat(".old");
+      fs::rename(destination_, old);
+      std::error_code fault, ignored;
+      fs::rename(path_, destination_, fault);
+      if (fault) fs::rename(old, destination_, ignored);
+      if (fault) throw fs::filesystem_error("rename", path_, destination_, fault);
+      fs::remove_all(old, ignored);
+    }
+    path_.clear();
+  }
+
+private:
+  bool replaceable() const {
+    return fs::is_directory(destination_) &&
+           (fs::is_empty(destination_) ||
+            (fs::exists(destination_ / "sequence.yaml") && fs::exists(destination_ / "scene.json")));
+  }
+
+  fs::path destination_, path_;
+};
+
+Image<uint16_t> depth_units(const DepthImage& depth_m, double scale) {
+  Image<uint16_t> units(depth_m.width(), depth_m.height());
+  for (size_t i = 0; i < depth_m.size(); ++i) {
+    const double value = std::round(double(depth_m.data()[i]) * scale);
+    units.data()[i] = value <= 65535 ? uint16_t(value) : 0;  // too far to be stored: not measured
+  }
+  return units;
+}
+
+/// Labels in 8 bits where every class of the table fits, else in 16.
+std::vector<uint8_t> label_png(const LabelImage& labels, const ClassTable& classes) {
+  const bool narrow =
+      std::all_of(classes.classes().begin(), classes.classes().end(), [](const ClassInfo& c) { return c.id < 256; });
+  if (!narrow) return encode_png(labels);
+  Image<uint8_t> bytes(labels.width(), labels.height());
+  std::copy(labels.begin(), labels.end(), bytes.begin());
+  return encode_png(bytes);
+}
+
+std::vector<uint8_t> probability_png(const ProbabilityImage& p) {
+  Image<uint16_t> planes(p.width, 2 * p.top * p.height);
+  const size_t pixels = size_t(p.width) * p.height;
+  for (size_t i = 0; i < pixels; ++i)
+    for (int r = 0; r < p.top; ++r) {
+      planes.data()[r * pixels + i] = p.class_id[i * p.top + r];
+      planes.data()[(p.top + r) * pixels + i] = uint16_t(std::lround(65535 * double(p.probability[i * p.top + r])));
+    }
+  return encode_png(planes);
+}
+
+std::string class_table_yaml(const ClassTable& classes) {
+  std::string text = "classes:\n";
+  for (const ClassInfo& c : classes.classes())
+    text += formatted("  - {id: %d, name: %s, color: [%d, %d, %d]%s}\n", c.id, c.name.c_str(), c.color.r, c.color.g,
+                      c.color.b, c.ignore ? ", ignore: true" : "");
+  return text;
+}
+
+std::string sequence_yaml(const SimulationSettings& s, const std::string& root, const std::string& labels,
+                          const std::string& classes) {
+  const PinholeCamera& c = s.camera;
+  std::string text = "name: " + s.scene.name + "\n";
+  text += formatted("camera: {fx: %.15g, fy: %.15g, cx: %.15g, cy: %.15g, width: %d, height: %d}\n", c.fx, c.fy, c.cx,
+                    c.cy, c.width, c.height);
+  text += formatted("depth_scale: %.15g\npose_convention: camera-to-world\n", s.depth_scale);
+  text += "paths: {color: " + root + "color, depth: " + root + "depth, labels: " + labels + ", instances: " + root +
+          "instances, poses: " + root + "poses.txt, classes: " + classes + "}\n";
+  return text;
+}
+
+std::string poses_text(const Trajectory& trajectory) {
+  std::string text;
+  for (size_t i = 0; i < trajectory.size(); ++i) {
+    text += std::to_string(i);
+    const Eigen::Matrix4d T = trajectory[i].matrix();
+    for (int row = 0; row < 4; ++row)
+      for (int column = 0; column < 4; ++column) text += formatted(" %.15g", T(row, column));
+    text += "\n";
+  }
+  return text;
+}
+
+std::string simulation_json(const SimulationSettings& s, const std::vector<SimulatedTouch>& touches) {
+  nlohmann::ordered_json out;
+  out["seed"] = s.seed;
+  out["frames"] = s.trajectory.size();
+  out["label_set"] = s.label_set == LabelSet::semantic ? "semantic" : "material";
+  out["depth_noise"] = nullptr;
+  if (s.noise)
+    out["depth_noise"] = {{"axial_scale", s.noise->axial_scale},
+                          {"lateral_scale", s.noise->lateral_scale},
+                          {"disparity_step_px", s.noise->disparity_step_px},
+                          {"baseline_m", s.noise->baseline_m},
+                          {"max_incidence_deg", s.noise->max_incidence_deg},
+                          {"edge_dropout", s.noise->edge_dropout},
+                          {"random_dropout", s.noise->random_dropout}};
+  out["network"] = nullptr;
+  if (s.network) {
+    constexpr const char* kScales[] = {"pixel", "segment", "scene"};
+    out["network"] = {{"confusion", "confusion.csv"},
+                      {"errors", kScales[int(s.network->scale)]},
+                      {"top", s.network->top},
+                      {"sharpness", s.network->sharpness}};
+  }
+  for (const SimulatedTouch& t : touches)
+    out["touches"].push_back({{"frame", t.frame},
+                              {"instance", t.instance},
+                              {"material", s.scene.materials.at_slot(s.scene.materials.slot_of_id(t.material)).name},
+                              {"value", t.value}});
+  return out.dump();
+}
+
+void check(const SimulationSettings& s) {
+  std::vector<std::string> problems;
+  if (s.trajectory.empty()) problems.push_back(describe_mismatch("simulate", "frames", "at least 1", "0"));
+  if (!(s.depth_scale >= 1 && s.depth_scale <= 65535))
+    problems.push_back(describe_mismatch("simulate", "depth scale", "1 to 65535", std::to_string(s.depth_scale)));
+  const int k = (s.label_set == LabelSet::semantic ? s.scene.semantics : s.scene.materials).size();
+  if (s.network && s.network->confusion.k != k)
+    problems.push_back(describe_mismatch("simulate", "confusion matrix", std::to_string(k) + " classes",
+                                         std::to_string(s.network->confusion.k)));
+  if (s.touches.count > 0 && s.properties.empty())
+    problems.push_back(describe_mismatch("simulate", "properties", "at least one for touches", "none"));
+  if (!problems.empty()) throw ConfigError(problems);
+}
+
+void write_frame(const SimulationSettings& s, const ClassTable& classes, const fs::path& folder, size_t i) {
+  const SceneView view = render_view(s.scene, s.camera, s.trajectory[i]);
+  const auto png = frame_name(i, ".png");
+  const DepthImage depth_m = s.noise ? add_depth_noise(view, s.camera, *s.noise, s.seed, int64_t(i)) : view.depth_m;
+  write_bytes(folder / "depth" / png, encode_png(depth_units(depth_m, s.depth_scale)));
+  if (s.jpeg_color)
+    write_bytes(folder / "color" / frame_name(i, ".jpg"), encode_jpeg(view.color));
+  else
+    write_bytes(folder / "color" / png, encode_png(view.color));
+  write_bytes(folder / "instances" / png, encode_png(view.instances));
+  write_bytes(folder / "truth" / "semantic" / png, label_png(view.semantics, s.scene.semantics));
+  write_bytes(folder / "truth" / "material" / png, label_png(view.materials, s.scene.materials));
+  const LabelImage& labels = s.label_set == LabelSet::semantic ? view.semantics : view.materials;
+  if (!s.network) {
+    write_bytes(folder / "labels" / png, label_png(labels, classes));
+    return;
+  }
+  const NetworkOutput seen = run_network(*s.network, classes, labels, view.instances, s.seed, int64_t(i));
+  write_bytes(folder / "labels" / png, label_png(seen.labels, classes));
+  if (!seen.probabilities.empty()) write_bytes(folder / "probs" / png, probability_png(seen.probabilities));
+}
+
+bool write_sequence(const SimulationSettings& s, const fs::path& out, bool replace,
+                    const std::function<bool(int64_t)>& progress) {
+  const ClassTable& classes = s.label_set == LabelSet::semantic ? s.scene.semantics : s.scene.materials;
+  const char* set_name = s.label_set == LabelSet::semantic ? "semantic" : "material";
+  FolderInProgress folder(out, replace);
+  const fs::path& root = folder.path();
+  for (const char* part : {"color", "depth", "labels", "instances", "truth/semantic", "truth/material"})
+    fs::create_directories(root / part);
+  if (s.network && s.network->top > 0) fs::create_directories(root / "probs");
+
+  // The small files first: what they can find fault with needs no frames.
+  const auto write_text = [&](const fs::path& name, const std::string& text) {
+    write_bytes(root / name, {text.begin(), text.end()});
+  };
+  std::vector<SimulatedTouch> touches;
+  if (s.touches.count > 0) touches = simulate_touches(s.scene, s.trajectory, s.camera, s.properties[0], s.touches);
+  write_text("sequence.yaml", sequence_yaml(s, "", "labels", "classes.yaml"));
+  write_text("truth/sequence.yaml", sequence_yaml(s, "../", set_name, std::string(set_name) + ".yaml"));
+  write_text("poses.txt", poses_text(s.trajectory));
+  write_text("classes.yaml", class_table_yaml(classes));
+  write_text("truth/semantic.yaml", class_table_yaml(s.scene.semantics));
+  write_text("truth/material.yaml", class_table_yaml(s.scene.materials));
+  if (s.label_set == LabelSet::material) write_text("properties.yaml", properties_yaml(s.properties));
+  if (s.network) write_text("confusion.csv", confusion_csv(s.network->confusion, classes));
+  if (s.touches.count > 0) write_text("touches.csv", touches_csv(touches, s.properties[0].name));
+  write_text("scene.json", scene_json(s.scene, simulation_json(s, touches)));
+  if (s.with_mesh) write_scene_mesh(scene_mesh(s.scene), root / "mesh.ply");
+
+  constexpr size_t kBatch = 16;  // frames between two calls of `progress`; memory stays bounded by the threads at work
+  for (size_t first = 0; first < s.trajectory.size(); first += kBatch) {
+    const size_t end = std::min(first + kBatch, s.trajectory.size());
+    tbb::parallel_for(first, end, [&](size_t i) { write_frame(s, classes, root, i); });
+    if (progress && !progress(int64_t(end))) return false;
+  }
+  folder.commit();
+  return true;
+}
+
+}  // namespace
+
+std::vector<double> class_shares(const Scene& scene, const Trajectory& trajectory, const PinholeCamera& camera,
+                                 LabelSet label_set) {
+  const ClassTable& classes = label_set == LabelSet::semantic ? scene.semantics : scene.materials;
+  const PinholeCamera small = resized(camera, 80, 60);
+  std::vector<double> shares(classes.size(), 0.0);
+  double total = 0;
+  const size_t step = std::max<size_t>(1, trajectory.size() / 32);
+  for (size_t i = 0; i < trajectory.size(); i += step) {
+    const SceneView view = render_view(scene, small, trajectory[i], false);
+    for (const uint16_t id : label_set == LabelSet::semantic ? view.semantics : view.materials)
+      if (const uint16_t slot = classes.slot_of_id(id); slot != ClassTable::kNoSlot) shares[slot] += 1, total += 1;
+  }
+  for (double& share : shares) share = total > 0 ? share / total : 1.0 / double(shares.size());
+  return shares;
+}
+
+bool write_simulated_sequence(const SimulationSettings& settings, const fs::path& out, bool replace,
+                              const std::function<bool(int64_t)>& progress) {
+  check(settings);
+  try {
+    return write_sequence(settings, out, replace, progress);
+  } catch (const fs::filesystem_error& e) {
+    throw IoError(out.string() + ": cannot be written: " + e.code().message() + " (" + e.path1().string() + ")");
+  }
+}
+
+}  // namespace felt
