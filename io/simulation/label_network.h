@@ -26,12 +26,12 @@ struct LabelNetwork {
   int top = 0;
   /// Exponent applied to them before they are normalised: above 1 the network is surer than it is right.
   double sharpness = 1;
-  std::vector<double> class_share;  ///< of each true class among the pixels; empty: uniform
+  std::vector<double> class_share = {};  ///< of each true class among the pixels; empty: uniform
 };
 
 /// "good", "medium" or "poor": right for about 92, 78 or 55 % of the pixels of a class (a few points more or less from
-/// class to class); most mistakes go to three look-alikes of the true class, which is one of each other's for ice and
-/// snow, concrete and rock, wood and plastic, and the like. Throws ConfigError for another name.
+/// class to class). Most mistakes go to three other classes, look-alikes first: ice and snow, concrete and rock, wood
+/// and plastic. Throws ConfigError for another name.
 ConfusionMatrix preset_confusion(const std::string& name, const ClassTable& classes);
 std::span<const char* const> preset_confusion_names();
 

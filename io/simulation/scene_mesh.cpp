@@ -177,19 +177,13 @@ std::vector<Polygon> visible_parts(const Scene& scene, size_t own, const Polygon
   return parts;
 }
 
-SceneMesh visible_surface(const Scene& scene, size_t own, double chord_error_m) {
-  SceneMesh mesh;
-  const Primitive& p = scene.primitives[own];
-  for (const Polygon& face : faces_of(p, chord_error_m)) {
+TriangleMesh visible_surface(const Scene& scene, size_t own, double chord_error_m) {
+  TriangleMesh mesh;
+  for (const Polygon& face : faces_of(scene.primitives[own], chord_error_m)) {
     for (const Polygon& part : visible_parts(scene, own, face, chord_error_m)) {
-      const uint32_t first = uint32_t(mesh.vertices.size());
-      for (const Vector3d& corner : part) mesh.vertices.push_back(corner.cast<float>());
-      for (uint32_t i = 2; i < part.size(); ++i) {
-        mesh.triangles.push_back({first, first + i - 1, first + i});
-        mesh.semantic.push_back(p.semantic);
-        mesh.material.push_back(p.material);
-        mesh.instance.push_back(p.instance);
-      }
+      const uint32_t first = uint32_t(mesh.positions.size());
+      for (const Vector3d& corner : part) mesh.positions.push_back(corner.cast<float>());
+      for (uint32_t i = 2; i < part.size(); ++i) mesh.triangles.emplace_back(first, first + i - 1, first + i);
     }
   }
   return mesh;
@@ -197,38 +191,43 @@ SceneMesh visible_surface(const Scene& scene, size_t own, double chord_error_m) 
 
 }  // namespace
 
-SceneMesh scene_mesh(const Scene& scene, double chord_error_m) {
-  std::vector<SceneMesh> parts(scene.primitives.size());
+TriangleMesh scene_mesh(const Scene& scene, double chord_error_m) {
+  std::vector<TriangleMesh> parts(scene.primitives.size());
   tbb::parallel_for(size_t(0), parts.size(), [&](size_t i) { parts[i] = visible_surface(scene, i, chord_error_m); });
-  SceneMesh mesh;
-  for (const SceneMesh& part : parts) {
-    const uint32_t first = uint32_t(mesh.vertices.size());
-    mesh.vertices.insert(mesh.vertices.end(), part.vertices.begin(), part.vertices.end());
-    for (const auto& t : part.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-    mesh.semantic.insert(mesh.semantic.end(), part.semantic.begin(), part.semantic.end());
-    mesh.material.insert(mesh.material.end(), part.material.begin(), part.material.end());
-    mesh.instance.insert(mesh.instance.end(), part.instance.begin(), part.instance.end());
+  TriangleMesh mesh;
+  mesh.triangle_scalars = {{"semantic", {}}, {"material", {}}, {"instance", {}}};
+  for (size_t i = 0; i < parts.size(); ++i) {
+    const uint32_t first = uint32_t(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), parts[i].positions.begin(), parts[i].positions.end());
+    for (const Triangle& t : parts[i].triangles) mesh.triangles.emplace_back(t.array() + first);
+    const Primitive& p = scene.primitives[i];
+    const uint16_t ids[] = {p.semantic, p.material, p.instance};
+    for (size_t s = 0; s < std::size(ids); ++s)
+      mesh.triangle_scalars[s].values.resize(mesh.triangles.size(), float(ids[s]));
   }
   return mesh;
 }
 
-void write_scene_mesh(const SceneMesh& mesh, const std::filesystem::path& file) {
+void write_scene_mesh(const TriangleMesh& mesh, const std::filesystem::path& file) {
   static_assert(std::endian::native == std::endian::little, "the PLY is written in the machine's byte order");
   std::string ply =
       "ply\nformat binary_little_endian 1.0\ncomment exact surface of a simulated scene, metres\nelement vertex " +
-      std::to_string(mesh.vertices.size()) + "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
+      std::to_string(mesh.positions.size()) + "\nproperty float x\nproperty float y\nproperty float z\nelement face " +
       std::to_string(mesh.triangles.size()) +
       "\nproperty list uchar int vertex_indices\nproperty uchar semantic\nproperty uchar material\n"
       "property ushort instance\nend_header\n";
   const auto append = [&](const auto& value) { ply.append(reinterpret_cast<const char*>(&value), sizeof value); };
-  for (const Eigen::Vector3f& v : mesh.vertices)
+  for (const Eigen::Vector3f& v : mesh.positions)
     for (int i = 0; i < 3; ++i) append(v[i]);
+  const auto scalar = [&](const char* name, size_t i) {
+    return TriangleMesh::find(mesh.triangle_scalars, name)->at(i);
+  };
   for (size_t i = 0; i < mesh.triangles.size(); ++i) {
     append(uint8_t(3));
     for (const uint32_t vertex : mesh.triangles[i]) append(int32_t(vertex));
-    append(uint8_t(mesh.semantic[i]));
-    append(uint8_t(mesh.material[i]));
-    append(mesh.instance[i]);
+    append(uint8_t(scalar("semantic", i)));
+    append(uint8_t(scalar("material", i)));
+    append(uint16_t(scalar("instance", i)));
   }
   write_file_atomically(file, ply);
 }

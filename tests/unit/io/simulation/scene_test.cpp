@@ -63,7 +63,7 @@ TEST_CASE("the signed distance changes no faster than the point moves") {
 TEST_CASE("a rendered view is the ray cast of every pixel") {
   for (const std::string& name : scene_names()) {
     const Scene scene = make_scene(name);
-    const PinholeCamera camera = simulated_camera(80, 60);
+    const PinholeCamera camera = simulated_camera(40, 30);
     for (const auto& T : standard_trajectory(scene, 3)) {
       const SceneView view = render_view(scene, camera, T);
       for (int v = 0; v < camera.height; ++v) {
