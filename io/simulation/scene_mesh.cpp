@@ -87,8 +87,8 @@ std::vector<Polygon> faces_of(const Primitive& p, double chord_error_m) {
     case ShapeKind::box:
       faces = box_faces(half);
       break;
-    case ShapeKind::sphere:
-      faces = sphere_faces(half.x(), pieces_of_circle(half.x(), chord_error_m));
+    case ShapeKind::sphere:  // curved both ways, so each has half of the error
+      faces = sphere_faces(half.x(), pieces_of_circle(half.x(), chord_error_m / 2));
       break;
     case ShapeKind::cylinder:
       faces = cylinder_faces(half.x(), half.z(), pieces_of_circle(half.x(), chord_error_m));
