@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "io/property_yaml.h"
 #include "io/simulation/touches.h"
+#include "tests/support/data.h"
 
 using namespace felt;
 
@@ -113,6 +114,6 @@ TEST_CASE("readings of one thing share the stated part of their variance") {
 }
 
 TEST_CASE("the simulator's friction table is the one that ships") {
-  const PropertyTable shipped = read_properties(std::string(FELTMAP_SOURCE_DIR) + "/data/friction.yaml");
+  const PropertyTable shipped = read_properties(test::source_dir() / "data" / "friction.yaml");
   CHECK(simulated_properties() == shipped);
 }
