@@ -37,6 +37,7 @@ struct SimulateOptions {
   double sharpness = 1;
   int touches = 0;
   double touch_sigma = 0;
+  std::string touch_where = "anywhere";
   std::string properties;
   uint64_t seed = 1;
   double depth_scale = 5000;
@@ -95,6 +96,12 @@ SimulationSettings settings_of(const SimulateOptions& o) {
   }
   if (!o.properties.empty()) s.properties = read_properties(o.properties);
   s.touches = {o.touches, o.touch_sigma, o.seed};
+  if (o.touch_where == "mistaken") {
+    if (!s.network || s.label_set != LabelSet::material)
+      throw ConfigError(
+          describe_mismatch("simulate", "--touch-where mistaken", "--labels material and a --network", "none"));
+    s.touches.mistaken_by = s.network;
+  }
   s.seed = o.seed;
   s.depth_scale = o.depth_scale;
   s.jpeg_color = o.color == "jpg";
@@ -180,6 +187,9 @@ void add_simulate(CLI::App& app) {
   command.add_option("--touches", o.touches, "Number of touches")->check(CLI::Range(0, 100000))->capture_default_str();
   command.add_option("--touch-sigma", o.touch_sigma, "Measurement noise of the readings")
       ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command.add_option("--touch-where", o.touch_where, "Anywhere, or only where the network mistakes the material")
+      ->check(CLI::IsMember({"anywhere", "mistaken"}))
       ->capture_default_str();
   command.add_option("--properties", o.properties,
                      "What touches measure (YAML); without it the friction of eight materials");

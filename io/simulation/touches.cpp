@@ -15,9 +15,10 @@ enum Stream : uint64_t { kThing = 200, kPixel, kRegion, kReading, kMeasurement }
 
 using Segment = std::pair<uint16_t, uint16_t>;  // instance, material
 
-/// Pixels of each segment whose neighbours four pixels away belong to it too.
+/// Pixels of each segment whose neighbours four pixels away belong to it too; where `predicted` is given, only those it
+/// is wrong about.
 std::map<Segment, std::vector<int>> touchable_pixels(const Scene& scene, const SceneView& view,
-                                                     const Property& property) {
+                                                     const Property& property, const LabelImage* predicted) {
   constexpr int kMargin = 4;
   std::map<Segment, std::vector<int>> pixels;
   const int w = view.depth_m.width(), h = view.depth_m.height();
@@ -27,6 +28,7 @@ std::map<Segment, std::vector<int>> touchable_pixels(const Scene& scene, const S
       const Segment here = segment(u, v);
       const uint16_t slot = scene.materials.slot_of_id(here.second);
       if (slot == ClassTable::kNoSlot || !property.priors.contains(scene.materials.at_slot(slot).name)) continue;
+      if (predicted != nullptr && (*predicted)(u, v) == here.second) continue;
       if (segment(u - kMargin, v) == here && segment(u + kMargin, v) == here && segment(u, v - kMargin) == here &&
           segment(u, v + kMargin) == here)
         pixels[here].push_back(v * w + u);
@@ -47,7 +49,12 @@ std::vector<SimulatedTouch> simulate_touches(const Scene& scene, const Trajector
     const size_t frame =
         std::min(size_t(i + 1) * trajectory.size() / (size_t(options.count) + 1), trajectory.size() - 1);
     const SceneView view = render_view(scene, camera, trajectory[frame], false);
-    const auto pixels = touchable_pixels(scene, view, property);
+    LabelImage predicted;
+    if (options.mistaken_by)
+      predicted = run_network(*options.mistaken_by, scene.materials, view.materials, view.instances, options.seed,
+                              int64_t(frame))
+                      .labels;
+    const auto pixels = touchable_pixels(scene, view, property, options.mistaken_by ? &predicted : nullptr);
     if (pixels.empty()) continue;
     int fewest = options.count;
     for (const auto& [segment, where] : pixels) fewest = std::min(fewest, times[segment]);

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/property_table.h"
+#include "io/simulation/label_network.h"
 #include "io/simulation/render_sequence.h"
 
 namespace felt {
@@ -22,6 +24,8 @@ struct TouchOptions {
   int count = 0;
   double sigma = 0;
   uint64_t seed = 1;
+  /// Where given, only places are touched whose material this network, run with `seed`, mistakes in that frame.
+  std::optional<LabelNetwork> mistaken_by = std::nullopt;
 };
 
 /// Touches spread evenly over the sequence, each on a surface that its frame sees: on the thing and material touched

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <sstream>
 
 #include "tests/support/data.h"
 
@@ -26,9 +27,10 @@ std::map<std::string, std::string> files_of(const fs::path& folder) {
 TEST_CASE("the stored scenes are what the simulator writes, and small") {
   const felt::test::TemporaryDirectory directory;
   const fs::path root = felt::test::source_dir();
-  const std::string line = "'" + (root / "scripts" / "make_scenes").string() + "' '" + felt::test::command().string() +
-                           "' '" + directory.path().string() + "' > /dev/null";
-  REQUIRE(std::system(line.c_str()) == 0);
+  std::ostringstream line;
+  line << (root / "scripts" / "make_scenes") << " " << felt::test::command() << " " << directory.path()
+       << " > /dev/null";
+  REQUIRE(std::system(line.str().c_str()) == 0);
   const auto stored = files_of(root / "data" / "scenes"), made = files_of(directory.path());
   CHECK(stored.size() > 100);
   std::map<std::string, size_t> bytes;

@@ -91,6 +91,25 @@ TEST_CASE("touches lie on surfaces of touchable material, one segment after anot
   CHECK(touches_csv(touches, "friction").substr(0, 33) == "frame,x,y,z,property,value,sigma\n");
 }
 
+TEST_CASE("touches where the network is mistaken are where it is mistaken") {
+  const Scene scene = make_scene("ice_crossing");
+  const Trajectory trajectory = standard_trajectory(scene, 20);
+  const PinholeCamera camera = simulated_camera(160, 120);
+  TouchOptions options{20, 0, 4};
+  options.mistaken_by = LabelNetwork{preset_confusion("poor", scene.materials), ErrorScale::scene};
+  const auto touches = simulate_touches(scene, trajectory, camera, simulated_properties()[0], options);
+  REQUIRE(!touches.empty());
+  for (const SimulatedTouch& t : touches) {
+    const SceneView view = render_view(scene, camera, trajectory[t.frame], false);
+    const LabelImage predicted =
+        run_network(*options.mistaken_by, scene.materials, view.materials, view.instances, 4, t.frame).labels;
+    for (size_t i = 0; i < predicted.size(); ++i) {
+      if (view.instances.data()[i] == t.instance && view.materials.data()[i] == t.material)
+        REQUIRE(predicted.data()[i] != t.material);
+    }
+  }
+}
+
 TEST_CASE("readings of one thing share the stated part of their variance") {
   // One box touched often: across seeds the variance of single readings is sd^2, of which rho lies between seeds.
   const Scene scene = make_scene("plane");
