@@ -25,6 +25,9 @@ void add_commands(CLI::App& app) {
   app.set_version_flag("--version", [] { return "feltmap " FELTMAP_VERSION " (SIMD: " + simd_name() + ")"; });
   add_simulate(app);
   app.footer("Each command explains itself, with an example: feltmap <command> --help");
+  add_merge(app);
+  add_diff(app);
+  add_verify(app);
 }
 
 int run(int argc, char** argv) {

@@ -1,0 +1,73 @@
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "apps/command.h"
+#include "apps/commands.h"
+#include "apps/exit_code.h"
+#include "io/map_file.h"
+#include "mapping/merge.h"
+
+namespace felt::apps {
+namespace {
+
+struct Options {
+  CommonOptions common;
+  std::vector<std::string> maps;
+  std::string out;
+  MergeOptions merge;
+};
+
+int run(const Options& options) {
+  using Clock = std::chrono::steady_clock;
+  const auto seconds = [](Clock::time_point a, Clock::time_point b) {
+    return std::chrono::duration<double>(b - a).count();
+  };
+  const auto start = Clock::now();
+  std::vector<Map> maps;
+  maps.reserve(options.maps.size());
+  std::vector<const Map*> pointers;
+  for (const std::string& path : options.maps) pointers.push_back(&maps.emplace_back(load_map(path)));
+  const auto loaded = Clock::now();
+  const Map result = merge(pointers, options.merge);
+  const auto merged = Clock::now();
+  save_map(result, options.out);
+  const auto saved = Clock::now();
+  const nlohmann::json report = {
+      {"out", options.out},
+      {"maps", options.maps},
+      {"frames", frame_count(result.frames)},
+      {"blocks", result.store.size()},
+      {"active_voxels", active_voxel_count(result)},
+      {"map_hash", map_hash(result)},
+      {"time_s",
+       {{"load", seconds(start, loaded)}, {"merge", seconds(loaded, merged)}, {"save", seconds(merged, saved)}}}};
+  if (options.common.json)
+    std::printf("%s\n", report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  else if (!options.common.quiet)
+    std::printf("%s: %zu maps merged: %zu frames, %zu blocks, hash %s\n", options.out.c_str(), maps.size(),
+                frame_count(result.frames), result.store.size(), report.at("map_hash").get<std::string>().c_str());
+  return kDone;
+}
+
+}  // namespace
+
+void add_merge(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  CLI::App& command = add_command(
+      app,
+      {"merge", "Join maps of the same world frame into one, as if all their frames had been fused together.",
+       "feltmap merge monday/map.vdb tuesday/map.vdb --out both.vdb"},
+      options->common, [options] { return run(*options); });
+  command.add_option("MAPS", options->maps, "Map files")->required()->expected(1, -1);
+  command.add_option("--out", options->out, "Map file to write")->required();
+  command.add_flag("--allow-shared-frames", options->merge.allow_shared_frames,
+                   "Merge although the journals share frames, which then count twice");
+  command.add_option("--max-weight", options->merge.max_weight, "Cap of the summed weight, as in reconstruct")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+}
+
+}  // namespace felt::apps

@@ -1,0 +1,67 @@
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/command.h"
+#include "apps/commands.h"
+#include "apps/exit_code.h"
+#include "core/error.h"
+#include "io/map_file.h"
+#include "mapping/map_verify.h"
+
+namespace felt::apps {
+namespace {
+
+struct Options {
+  CommonOptions common;
+  std::string map;
+};
+
+int print(const Options& options, const nlohmann::json& report, const std::string& text) {
+  if (options.common.json)
+    std::printf("%s\n", report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  else if (!options.common.quiet || !report.at("sound"))
+    std::printf("%s", text.c_str());
+  return report.at("sound") ? kDone : kDifferent;
+}
+
+int run(const Options& options) {
+  nlohmann::json report = {{"map", options.map}, {"sound", false}, {"faults", nlohmann::json::array()}};
+  try {
+    const Map map = load_map(options.map);
+    report["map_hash"] = map_hash(map);
+    report["blocks"] = map.store.size();
+    report["active_voxels"] = active_voxel_count(map);
+    std::string text;
+    for (const MapFault& fault : verify(map)) {
+      report["faults"].push_back({{"grid", fault.grid},
+                                  {"broken", fault.broken},
+                                  {"voxels", fault.voxels},
+                                  {"first", {fault.first.x, fault.first.y, fault.first.z}}});
+      text += options.map + ": " + fault.grid + ": not so: " + fault.broken + ": " + std::to_string(fault.voxels) +
+              " voxels, the first at (" + std::to_string(fault.first.x) + ", " + std::to_string(fault.first.y) + ", " +
+              std::to_string(fault.first.z) + ")\n";
+    }
+    report["sound"] = report["faults"].empty();
+    if (report["sound"])
+      text = options.map + ": sound: checksum, hash and every invariant of " + std::to_string(map.store.size()) +
+             " blocks\n";
+    return print(options, report, text);
+  } catch (const FormatError& error) {
+    report["faults"].push_back({{"grid", "file"}, {"broken", error.what()}});
+    return print(options, report, std::string(error.what()) + "\n");
+  }
+}
+
+}  // namespace
+
+void add_verify(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  CLI::App& command = add_command(app,
+                                  {"verify", "Check a map file: checksum, hash and every invariant of its values.",
+                                   "feltmap verify out/map.vdb\nfeltmap verify out/map.vdb --json"},
+                                  options->common, [options] { return run(*options); });
+  command.add_option("MAP", options->map, "Map file (map.vdb)")->required();
+}
+
+}  // namespace felt::apps

@@ -1,0 +1,85 @@
+#include "mapping/map_verify.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace felt {
+namespace {
+
+/// Counts by grid and invariant, in the order in which they are first broken.
+class Faults {
+public:
+  void add(const std::string& grid, const char* broken, const BlockCoord& block, int offset) {
+    const auto [at, fresh] = index_.try_emplace({grid, broken}, faults_.size());
+    if (fresh) {
+      const Index3 base = first_voxel(block), in = voxel_of_offset(offset);
+      faults_.push_back({grid, broken, 0, {base.x + in.x, base.y + in.y, base.z + in.z}});
+    }
+    ++faults_[at->second].voxels;
+  }
+  std::vector<MapFault> take() { return std::move(faults_); }
+
+private:
+  std::vector<MapFault> faults_;
+  std::map<std::pair<std::string, std::string>, size_t> index_;
+};
+
+/// Averages of values at the truncation may round beyond it, a little with each of up to max_weight observations.
+constexpr float kRounding = 1.0001f;
+
+void verify_geometry(const Block& block, float truncation_m, Faults& faults) {
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    const float t = block.geometry->tsdf[i], w = block.geometry->weight[i];
+    if (!std::isfinite(w) || w < 0) faults.add("weight", "weight is finite and >= 0", block.coord, i);
+    if (!std::isfinite(t)) faults.add("tsdf", "distance is finite", block.coord, i);
+    if (std::fabs(t) > truncation_m * kRounding) faults.add("tsdf", "|distance| <= truncation", block.coord, i);
+    if (w == 0 && t != truncation_m)
+      faults.add("tsdf", "distance is the truncation where nothing was observed", block.coord, i);
+  }
+}
+
+void verify_color(const Block& block, Faults& faults) {
+  if (block.color == nullptr) return;
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    const bool colored = (block.color->r[i] | block.color->g[i] | block.color->b[i]) != 0;
+    if (block.color->count[i] == 0 && colored)
+      faults.add("color", "colour is 0 where it was not observed", block.coord, i);
+    if (std::max({block.color->r[i], block.color->g[i], block.color->b[i]}) > 255 * 256)
+      faults.add("color", "colour <= 255 grey levels", block.coord, i);
+  }
+}
+
+void verify_evidence(const Map& map, const Block& block, Faults& faults) {
+  int before = -1;
+  for (const EvidencePlane& plane : block.evidence) {
+    if (plane.slot >= map.classes.size()) {
+      faults.add("evidence", "every plane has a class in the table", block.coord, 0);
+      continue;
+    }
+    const std::string name = "evidence/" + map.classes.at_slot(plane.slot).name;
+    if (plane.slot <= before) faults.add(name, "planes in ascending order of classes", block.coord, 0);
+    before = plane.slot;
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      const float e = plane.counts->value[i];
+      if (!std::isfinite(e) || e < 0) faults.add(name, "evidence is finite and >= 0", block.coord, i);
+      if (e != 0 && !(block.geometry->weight[i] > 0))
+        faults.add(name, "evidence only where the surface was observed", block.coord, i);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<MapFault> verify(const Map& map) {
+  Faults faults;
+  for (const uint32_t number : map.store.sorted()) {
+    const Block& block = map.store[number];
+    verify_geometry(block, float(map.truncation_m), faults);
+    verify_color(block, faults);
+    verify_evidence(map, block, faults);
+  }
+  return faults.take();
+}
+
+}  // namespace felt

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <limits>
+#include <span>
+
+#include "mapping/map.h"
+
+namespace felt {
+
+struct MergeOptions {
+  /// Frames that two journals share would count twice: refused unless this is set.
+  bool allow_shared_frames = false;
+  /// Cap of the summed weight, as in integration (IntegrationConfig::max_weight).
+  float max_weight = 255.0f;
+};
+
+/// One map of what several maps of the same world frame observed: distances averaged by weight, colours by number of
+/// observations, weights and evidence added, journals joined. Equal to fusing all frames into one map: exactly where
+/// counts are added, within rounding where averages are, as long as no weight reached its cap. The result does not
+/// depend on the order of the arguments. Throws ConfigError naming every reason why the maps do not go together: voxel
+/// size, truncation, class table, shared frames.
+Map merge(std::span<const Map* const> maps, const MergeOptions& options = {});
+
+}  // namespace felt

@@ -1,0 +1,155 @@
+#include "mapping/merge.h"
+
+#include <catch2/catch.hpp>
+
+#include "core/error.h"
+#include "mapping/map_diff.h"
+#include "mapping/tsdf_integrator.h"
+#include "tests/support/random_map.h"
+#include "tests/support/views.h"
+
+using namespace felt;
+using Catch::Matchers::Contains;
+
+namespace {
+
+/// Frames first, first + step, ... < 12 of one fixed recording.
+Map fused(int first, int step) {
+  Map map(0.02, 0.08);
+  IntegrationScratch scratch;
+  test::Random random(11);
+  for (int n = 0; n < 12; ++n) {
+    const Frame frame = test::ball_before_wall(test::jittered_pose(random));
+    if (n < first || (n - first) % step != 0) continue;
+    integrate(map, frame, {}, scratch);
+    record_frame(map.frames, "recording", "default", n);
+  }
+  return map;
+}
+
+/// Adds evidence that a joint run would have given: whole counts.
+void add_labels(Map& map, uint64_t seed) {
+  map.classes = ClassTable({{1, "wood", {}, false}, {2, "grass", {}, false}, {3, "ice", {}, false}});
+  for (const uint32_t number : map.store.sorted()) {
+    Block& block = map.store[number];
+    for (uint16_t slot = 0; slot < 3; ++slot) {
+      if ((seed + slot + uint64_t(block.coord.x & 7)) % 3 == 0) continue;
+      Plane* plane = map.store.new_plane();
+      for (int i = 0; i < kBlockVoxels; ++i)
+        if (block.geometry->weight[i] > 0) plane->value[i] = float((seed * 7 + size_t(i)) % 5);
+      block.evidence.push_back({slot, plane});
+    }
+  }
+}
+
+double max_difference(const MapDifference& d, const std::string& name) {
+  for (const ChannelDifference& c : d.channels)
+    if (c.name == name) return c.max_difference;
+  return -1;
+}
+
+}  // namespace
+
+TEST_CASE("merging parts of a recording equals fusing it whole") {
+  const Map whole = fused(0, 1);
+  const Map parts[] = {fused(0, 4), fused(1, 4), fused(2, 4), fused(3, 4)};
+  const Map* const pointers[] = {&parts[0], &parts[1], &parts[2], &parts[3]};
+  const Map merged = merge(pointers);
+  const MapDifference d = difference(whole, merged);
+  // The same voxels; counts exactly, averages within rounding: 12 steps of a 24-bit average of values up to 0.08 m,
+  // weights up to 12 with fractions from the drop-off, and colour rounded to 1/256 grey level in each of 12 steps.
+  CHECK_FALSE(beyond(d, 0.05));
+  CHECK(max_difference(d, "tsdf") < 12 * 0.08 * 0x1p-23);
+  CHECK(max_difference(d, "tsdf") > 0);
+  CHECK(max_difference(d, "weight") < 12 * 12 * 0x1p-23);
+  CHECK(max_difference(d, "color_count") == 0);
+  CHECK(max_difference(d, "color") <= 12.0 / 256);
+  CHECK(frame_count(merged.frames) == 12);
+  CHECK(merged.frames == whole.frames);
+}
+
+TEST_CASE("merged evidence is the sum of the parts, plane by plane") {
+  Map a = fused(0, 2), b = fused(1, 2);
+  add_labels(a, 1);
+  add_labels(b, 2);
+  const Map* const pointers[] = {&a, &b};
+  const Map merged = merge(pointers);
+  size_t compared = 0;
+  for (const Block& block : merged.store.blocks())
+    for (const EvidencePlane& plane : block.evidence)
+      for (int i = 0; i < kBlockVoxels; ++i) {
+        float expected = 0;
+        for (const Map* map : pointers)
+          if (const Block* from = map->store.get(block.coord))
+            for (const EvidencePlane& e : from->evidence)
+              if (e.slot == plane.slot) expected += e.counts->value[i];
+        compared += expected != 0;
+        if (plane.counts->value[i] != expected) FAIL("voxel " << i << " of class " << plane.slot);
+      }
+  CHECK(compared > 1000);
+}
+
+TEST_CASE("the order of the maps does not change a bit of the merged map") {
+  Map a = fused(0, 3), b = fused(1, 3), c = fused(2, 3);
+  add_labels(a, 1);
+  add_labels(b, 2);
+  add_labels(c, 3);
+  const Map* order[] = {&a, &b, &c};
+  const Map first = merge(order);
+  const std::string hash = map_hash(first);
+  for (const auto& [x, y, z] : {std::tuple{0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}) {
+    const Map* const all[] = {&a, &b, &c};
+    const Map* const other[] = {all[x], all[y], all[z]};
+    const Map merged = merge(other);
+    CHECK(map_hash(merged) == hash);
+    CHECK(merged.frames == first.frames);
+    CHECK(merged.metadata == first.metadata);
+  }
+}
+
+TEST_CASE("a map merged with nothing but itself or an empty map keeps its values") {
+  const Map map = test::random_map({.seed = 5, .blocks = 10, .classes = 2});
+  const Map empty(0.02, 0.08);
+  const Map* const alone[] = {&map};
+  const Map* const with_empty[] = {&empty, &map};
+  // The random map's counts of colour go beyond what fusion counts to; they are cut.
+  CHECK_FALSE(beyond(difference(merge(with_empty), merge(alone)), 0));
+  MapDifference d = difference(map, merge(alone));
+  for (const ChannelDifference& c : d.channels)
+    if (c.name != "color_count") {
+      INFO(c.name);
+      CHECK(c.max_difference == 0);
+      CHECK(c.voxels_only_a + c.voxels_only_b == 0);
+    }
+}
+
+TEST_CASE("maps that share frames are refused unless that is allowed") {
+  const Map a = fused(0, 2), b = fused(0, 3);
+  const Map* const pointers[] = {&a, &b};
+  CHECK_THROWS_WITH(merge(pointers), Contains("2 shared") && Contains("of map 1") && Contains("recording"));
+  const Map twice = merge(pointers, {.allow_shared_frames = true});
+  CHECK(frame_count(twice.frames) == 10);
+}
+
+TEST_CASE("every reason why maps cannot be merged is named at once") {
+  Map a(0.02, 0.08), b(0.01, 0.04), c(0.02, 0.08);
+  a.classes = ClassTable({{1, "wood", {}, false}});
+  c.classes = ClassTable({{1, "grass", {}, false}});
+  const Map* const pointers[] = {&a, &b, &c};
+  CHECK_THROWS_WITH(merge(pointers), Contains("map 2: voxel size: expected 20.000000 mm, found 10.000000 mm") &&
+                                         Contains("map 2: truncation") && Contains("map 3: class table"));
+  CHECK_THROWS_AS(merge({}), ConfigError);
+}
+
+TEST_CASE("a merged weight does not pass the cap") {
+  Map a(0.02, 0.08), b(0.02, 0.08);
+  for (Map* map : {&a, &b}) {
+    Block& block = map->store[map->store.find_or_create({0, 0, 0})];
+    block.geometry->weight[0] = 200;
+    block.geometry->tsdf[0] = map == &a ? 0.02f : 0.04f;
+  }
+  const Map* const pointers[] = {&a, &b};
+  const Map merged = merge(pointers);
+  CHECK(merged.store[0].geometry->weight[0] == 255);
+  CHECK(merged.store[0].geometry->tsdf[0] == Approx(0.03));
+}

@@ -1,0 +1,62 @@
+#include "mapping/map_verify.h"
+
+#include <catch2/catch.hpp>
+#include <functional>
+#include <limits>
+
+#include "tests/support/random_map.h"
+
+using namespace felt;
+
+TEST_CASE("a sound map has no faults") {
+  CHECK(verify(test::random_map({.seed = 8, .blocks = 20, .classes = 4})).empty());
+  CHECK(verify(Map(0.02, 0.08)).empty());
+}
+
+TEST_CASE("each broken invariant is named with its grid, its count and the voxel") {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  struct Case {
+    const char *grid, *broken;
+    std::function<void(Map&, Block&)> harm;
+  };
+  const Case cases[] = {
+      {"weight", "finite", [&](Map&, Block& b) { b.geometry->weight[100] = kNan; }},
+      {"weight", ">= 0", [&](Map&, Block& b) { b.geometry->weight[100] = -1; }},
+      {"tsdf", "finite", [&](Map&, Block& b) { b.geometry->tsdf[100] = kNan; }},
+      {"tsdf", "<= truncation", [&](Map&, Block& b) { b.geometry->tsdf[100] = -0.0801f; }},
+      {"tsdf", "nothing was observed",
+       [&](Map&, Block& b) { b.geometry->weight[100] = 0, b.geometry->tsdf[100] = 0.01f; }},
+      {"color", "not observed",
+       [&](Map& m, Block& b) {
+         ColorPlanes& c = m.store.add_color(b);
+         c.count[100] = 0, c.g[100] = 7;
+       }},
+      {"color", "255", [&](Map& m, Block& b) { m.store.add_color(b).count[100] = 1, b.color->b[100] = 0xff01; }},
+      {"evidence/class 1", ">= 0",
+       [&](Map& m, Block& b) {
+         b.evidence = {{1, m.store.new_plane()}};
+         b.evidence[0].counts->value[100] = -2;
+       }},
+      {"evidence/class 0", "ascending",
+       [&](Map& m, Block& b) {
+         b.evidence = {{1, m.store.new_plane()}, {0, m.store.new_plane()}};
+       }},
+      {"evidence", "in the table",
+       [&](Map& m, Block& b) {
+         b.evidence = {{9, m.store.new_plane()}};
+       }},
+  };
+  for (const Case& c : cases) {
+    Map map = test::random_map({.seed = 8, .blocks = 3, .classes = 2});
+    Block& block = map.store[map.store.sorted()[1]];
+    block.evidence.clear();
+    c.harm(map, block);
+    const std::vector<MapFault> faults = verify(map);
+    INFO(c.grid << ": " << c.broken);
+    REQUIRE_FALSE(faults.empty());
+    CHECK(faults[0].grid == c.grid);
+    CHECK_THAT(faults[0].broken, Catch::Matchers::Contains(c.broken));
+    CHECK(faults[0].voxels == 1);
+    CHECK(block_of_voxel(faults[0].first) == block.coord);
+  }
+}
