@@ -17,7 +17,11 @@ std::string to_json(const MapDifference& difference, const std::string& a, const
                         {"voxels_changed", c.voxels_changed},
                         {"max_difference", number(c.max_difference)},
                         {"mean_difference", number(c.mean_difference)}};
-  return {
+  const nlohmann::json report = {
+      {"a", a},
+      {"b", b},
+      {"tolerance", tolerance},
+      {"differs", beyond(difference, tolerance)},
       {"same_hash", difference.same_hash},
       {"comparable", difference.comparable},
       {"settings", difference.settings},
