@@ -1,9 +1,9 @@
 #include "mapping/vdb_state.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/error.h"
+#include "mapping/leaf_mask.h"
 
 namespace felt {
 namespace {
@@ -28,9 +28,7 @@ typename Grid::Ptr state_grid(const Map& map, const std::string& name, Values va
     leaf->setOrigin(first_coord(block.coord));
     typename Grid::ValueType* out = leaf->buffer().data();
     if (!values(block, out)) continue;
-    leaf->setValuesOff();
-    for (int i = 0; i < kBlockVoxels; ++i)
-      if (out[i] != 0) leaf->setValueOn(i);
+    set_active(*leaf, [out](int i) { return out[i] != 0; });
     grid->tree().addLeaf(leaf.release());
   }
   return grid;
@@ -60,7 +58,7 @@ Block& block_of_leaf(Map& map, const Grid& grid, const openvdb::Coord& origin) {
 
 /// The exact inverse of color_grid's scale: a 16-bit value survives the trip through float.
 uint16_t stored_color(float value) {
-  return value > 0 ? uint16_t(std::lround(std::min(value * (255.0f * 256), 65535.0f))) : uint16_t(0);
+  return value > 0 ? uint16_t(int32_t(std::min(value * (255.0f * 256), 65535.0f) + 0.5f)) : uint16_t(0);
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "mapping/leaf_mask.h"
+
 namespace felt {
 namespace {
 
@@ -19,8 +21,7 @@ typename Grid::Ptr make_grid(const Map& map, const char* name, typename Grid::Va
     using Leaf = typename Grid::TreeType::LeafNodeType;
     auto leaf = std::make_unique<Leaf>(first_coord(block.coord), background);
     write(block, leaf->buffer().data());
-    for (int i = 0; i < kBlockVoxels; ++i)
-      if (block.geometry->weight[i] > 0) leaf->setValueOn(i);
+    set_active(*leaf, [&](int i) { return block.geometry->weight[i] > 0; });
     grid->tree().addLeaf(leaf.release());
   }
   return grid;

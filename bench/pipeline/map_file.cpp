@@ -1,7 +1,7 @@
 // Save and load of the map file against OpenVDB's own stream on the same grids, with one thread, in a folder that is in
 // memory. Rates are bytes of planes in memory (what the map holds) per second of the whole call.
-//   bench_map_file [blocks along a side of the wall] [folder]
-//   bench_map_file grids [folder]      memory with 1,000 grids
+//   bench_map_file none|blosc|zip [blocks along a side of the wall] [folder]
+//   bench_map_file grids                   memory with 1,000 grids
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 #include <sys/resource.h>
@@ -137,16 +137,17 @@ void measure_memory(const fs::path& folder) {
 int main(int argc, char** argv) {
   openvdb::initialize();
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
-  const std::string what = argc > 1 ? argv[1] : "120";
-  const fs::path folder = fs::path(argc > 2 ? argv[2] : "/dev/shm") / ("feltmap-bench-" + std::to_string(getpid()));
+  const std::string what = argc > 1 ? argv[1] : "blosc";
+  const int side = argc > 2 ? std::stoi(argv[2]) : 120;
+  const fs::path folder = fs::path(argc > 3 ? argv[3] : "/dev/shm") / ("feltmap-bench-" + std::to_string(getpid()));
   fs::create_directories(folder);
   if (what == "grids") {
     measure_memory(folder);
   } else {
-    const Map map = wall(std::stoi(what), 20);
-    measure(map, MapCompression::none, "none", folder);
-    measure(map, MapCompression::blosc, "blosc", folder);
-    measure(map, MapCompression::zip, "zip", folder);
+    const MapCompression compression = what == "none"  ? MapCompression::none
+                                       : what == "zip" ? MapCompression::zip
+                                                       : MapCompression::blosc;
+    measure(wall(side, 20), compression, what.c_str(), folder);
   }
   fs::remove_all(folder);
 }
