@@ -1,0 +1,135 @@
+// Depth fusion side by side: the same frames, voxels, truncation and threads, engines taking turns frame by frame so
+// that changes of the machine's speed hit all alike; and the distance of the surface each gives to the exact mesh of
+// the rendered house.
+//   bench_peers [speed|surface] [voxel_size_m] [threads] [frames]
+#include <tbb/global_control.h>
+
+#include <cstring>
+#include <numeric>
+
+#include "bench/peers/engine.h"
+#include "bench/support/bench.h"
+#include "core/simd.h"
+#include "io/mesh_io.h"
+#include "io/simulation/render_sequence.h"
+#include "mapping/marching_cubes.h"
+#include "mapping/mesh_distance.h"
+#include "mapping/tsdf_integrator.h"
+
+namespace {
+
+using namespace felt;
+using bench::Engine;
+using bench::Settings;
+
+class Feltmap final : public Engine {
+public:
+  explicit Feltmap(const Settings& s, DistanceModel distance = DistanceModel::optical_axis)
+      : map_(s.voxel_size_m, s.truncation_m) {
+    config_.max_depth_m = float(s.max_depth_m);
+    config_.distance = distance;
+  }
+  std::string name() const override { return "feltmap"; }
+  void prepare(const Frame& frame) override {
+    frames_.push_back(frame);
+    frames_.back().color = {};
+  }
+  void integrate(size_t n) override { felt::integrate(map_, frames_[n], config_, scratch_); }
+  std::vector<Eigen::Vector3f> surface() override { return extract_mesh(map_).positions; }
+
+private:
+  Map map_;
+  IntegrationConfig config_;
+  IntegrationScratch scratch_;
+  std::vector<Frame> frames_;
+};
+
+std::vector<std::unique_ptr<Engine>> engines(const Settings& settings) {
+  std::vector<std::unique_ptr<Engine>> all;
+  all.push_back(std::make_unique<Feltmap>(settings));
+  all.push_back(bench::open3d_voxel_block_grid(settings, 8));
+  all.push_back(bench::open3d_voxel_block_grid(settings, 16));
+  all.push_back(bench::open3d_scalable_volume(settings));
+  all.push_back(bench::opencv_hash_tsdf(settings));
+  return all;
+}
+
+void speed(const Settings& settings, const std::vector<Frame>& frames) {
+  constexpr int kRounds = 3;  // each from an empty map: the best of them counts, frame by frame
+  std::vector<std::vector<double>> best;
+  std::vector<std::string> names;
+  for (int round = 0; round < kRounds; ++round) {
+    auto all = engines(settings);
+    for (auto& engine : all)
+      for (const Frame& frame : frames) engine->prepare(frame);
+    best.resize(all.size(), std::vector<double>(frames.size(), 1e9));
+    names.clear();
+    for (auto& engine : all) names.push_back(engine->name());
+    for (size_t n = 0; n < frames.size(); ++n)
+      for (size_t e = 0; e < all.size(); ++e)
+        best[e][n] = std::min(best[e][n], bench::seconds([&] { all[e]->integrate(n); }));
+  }
+  const double ours = bench::median(best[0]);
+  std::printf("| engine | median ms a frame | mean ms | times feltmap |\n|---|---|---|---|\n");
+  for (size_t e = 0; e < best.size(); ++e)
+    std::printf("| %s | %.3f | %.3f | %.1f |\n", names[e].c_str(), 1e3 * bench::median(best[e]),
+                1e3 * std::accumulate(best[e].begin(), best[e].end(), 0.0) / double(frames.size()),
+                bench::median(best[e]) / ours);
+}
+
+void surface_table(const char* scene, const Settings& settings, const std::vector<Frame>& frames,
+                   const std::function<std::vector<float>(const std::vector<Eigen::Vector3f>&)>& error_m) {
+  auto all = engines(settings);
+  for (auto& engine : all) {
+    for (const Frame& frame : frames) engine->prepare(frame);
+    for (size_t n = 0; n < frames.size(); ++n) engine->integrate(n);
+    const std::vector<Eigen::Vector3f> points = engine->surface();
+    std::vector<float> error = error_m(points);
+    const double mean = std::accumulate(error.begin(), error.end(), 0.0) / double(error.size());
+    std::printf("| %s | %s | %.4f | %.4f | %zu |\n", scene, engine->name().c_str(), mean / settings.voxel_size_m,
+                bench::median({error.begin(), error.end()}) / settings.voxel_size_m, points.size());
+    std::fflush(stdout);
+  }
+}
+
+void surface(const Settings& settings) {
+  std::printf("| scene | engine | mean error, voxels | median, voxels | points |\n|---|---|---|---|---|\n");
+  const TriangleTree truth(read_mesh(bench::recorded("house_living_rendered") / "gt_mesh.ply"));
+  surface_table("rendered house, exact", settings, bench::decoded("house_living_rendered"),
+                [&](const auto& points) { return distances_to_mesh(points, truth); });
+  const Scene scene = make_scene("room1");
+  RenderOptions options;
+  options.with_color = false;
+  const Trajectory path = standard_trajectory(scene, 60);
+  const auto error_m = [&](const std::vector<Eigen::Vector3f>& points) {
+    std::vector<float> error;
+    for (const auto& p : points) error.push_back(std::abs(float(signed_distance_m(scene, p.cast<double>()))));
+    return error;
+  };
+  surface_table("room1, exact", settings, render_sequence(scene, path, simulated_camera(), options), error_m);
+  options.noise = DepthNoise{};
+  surface_table("room1, sensor noise", settings, render_sequence(scene, path, simulated_camera(), options), error_m);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  apply_simd_choice();
+  const bool only_surface = argc > 1 && std::strcmp(argv[1], "surface") == 0;
+  Settings settings;
+  if (argc > 2) settings.voxel_size_m = std::atof(argv[2]);
+  settings.truncation_m = 4 * settings.voxel_size_m;
+  const int threads = argc > 3 ? std::atoi(argv[3]) : 1;
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(threads));
+  bench::open3d_threads(threads);
+  bench::opencv_threads(threads);
+  std::printf("voxels of %g cm, truncation 4 voxels, depth to 4 m, %d thread(s), SIMD %s\n",
+              settings.voxel_size_m * 100, threads, simd_name().c_str());
+  if (only_surface) {
+    surface(settings);
+    return 0;
+  }
+  std::vector<Frame> frames = bench::decoded("7scenes_redkitchen");
+  if (argc > 4) frames.resize(std::min(frames.size(), size_t(std::atoi(argv[4]))));
+  speed(settings, frames);
+}

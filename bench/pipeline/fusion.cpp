@@ -1,0 +1,110 @@
+// Cost of fusing one frame, frames decoded beforehand: by voxel size and number of threads, with the machine's own
+// bound (memory bandwidth and scattered reads of depth) measured in the same run.
+//   bench_fusion [sequence]
+#include <tbb/global_control.h>
+
+#include <cstring>
+#include <numeric>
+
+#include "bench/support/bench.h"
+#include "core/simd.h"
+#include "mapping/tsdf_integrator.h"
+
+namespace {
+
+using namespace felt;
+
+struct Cost {
+  double allocate_ms = 0, fuse_ms = 0, total_ms = 0;  // medians over frames of the best of the repetitions
+  double first_third_ms = 0, last_third_ms = 0;       // does cost grow with the map?
+  double blocks_per_frame = 0, voxels_per_frame = 0;
+  size_t blocks = 0;
+  double bytes_per_voxel = 0;
+};
+
+Cost fuse_all(const std::vector<Frame>& frames, double voxel_size_m, size_t threads) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  std::vector<double> total(frames.size(), 1e9), allocate(frames.size(), 1e9), fuse(frames.size(), 1e9);
+  Cost cost;
+  constexpr int kRepetitions = 5;
+  for (int repetition = 0; repetition < kRepetitions; ++repetition) {
+    Map map(voxel_size_m, 4 * voxel_size_m);
+    IntegrationScratch scratch;
+    size_t blocks = 0;
+    for (size_t n = 0; n < frames.size(); ++n) {
+      const FrameStats stats = integrate(map, frames[n], {}, scratch);
+      total[n] = std::min(total[n], stats.allocate_s + stats.fuse_s);
+      allocate[n] = std::min(allocate[n], stats.allocate_s);
+      fuse[n] = std::min(fuse[n], stats.fuse_s);
+      blocks += stats.blocks_in_view;
+    }
+    cost.blocks_per_frame = double(blocks) / double(frames.size());
+    cost.blocks = map.store.size();
+    cost.bytes_per_voxel = double(map.store.geometry_bytes()) / double(map.store.size() * kBlockVoxels);
+  }
+  const auto ms = [](std::vector<double> s) { return 1e3 * bench::median(std::move(s)); };
+  const long third = long(frames.size() / 3);
+  cost.total_ms = ms(total), cost.allocate_ms = ms(allocate), cost.fuse_ms = ms(fuse);
+  cost.first_third_ms = ms({total.begin(), total.begin() + third});
+  cost.last_third_ms = ms({total.end() - third, total.end()});
+  return cost;
+}
+
+/// Least time for the memory traffic of one frame: every depth pixel once, tsdf and weight of each block in view read
+/// and written once, one scattered read of depth a voxel.
+double bound_ms(const std::vector<Frame>& frames, double blocks_per_frame) {
+  std::vector<float> stream(64 << 20 >> 2, 1.0f), target(stream.size());
+  double copy = 1e9, gather = 1e9;
+  for (int repetition = 0; repetition < 5; ++repetition)
+    copy = std::min(copy, bench::seconds([&] { std::memcpy(target.data(), stream.data(), stream.size() * 4); }));
+  const double bytes_per_s = 2.0 * double(stream.size()) * 4 / copy;
+  std::vector<uint32_t> pixel(1 << 16);
+  const DepthImage& depth = frames[frames.size() / 2].depth_m;
+  for (size_t i = 0; i < pixel.size(); ++i)  // the pattern of one block after another: 64 rows of nearby pixels
+    pixel[i] = uint32_t(((i / 64 % 440) * size_t(depth.width()) + i % 8 * 5 + i / 8 % 8 * 5 * size_t(depth.width())) %
+                        depth.size());
+  float sum = 0;
+  for (int repetition = 0; repetition < 20; ++repetition)
+    gather = std::min(gather, bench::seconds([&] {
+                        float s[4] = {};
+                        for (size_t i = 0; i < pixel.size(); i += 4)
+                          for (size_t j = 0; j < 4; ++j) s[j] += depth.data()[pixel[i + j]];
+                        sum += s[0] + s[1] + s[2] + s[3];
+                      }));
+  const double reads_per_s = double(pixel.size()) / gather;
+  const double voxels = blocks_per_frame * kBlockVoxels;
+  const double bytes = double(depth.size()) * 4 + voxels * 2 * 4 * 2;
+  std::printf("bound: %.1f GB/s copied, %.2f G scattered reads/s (%g)\n", bytes_per_s * 1e-9, reads_per_s * 1e-9,
+              sum > 0 ? 1.0 : 0.0);
+  return 1e3 * std::max(bytes / bytes_per_s, voxels / reads_per_s);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  apply_simd_choice();
+  std::vector<Frame> colored = bench::decoded(argc > 1 ? argv[1] : "7scenes_redkitchen");
+  std::vector<Frame> frames = colored;
+  for (Frame& frame : frames) frame.color = {};
+  std::printf("%zu frames of %dx%d, SIMD %s, weights constant, distance along the optical axis, depth to 4 m\n",
+              frames.size(), frames[0].depth_m.width(), frames[0].depth_m.height(), simd_name().c_str());
+  std::printf(
+      "| voxel | threads | colour | allocate ms | fuse ms | frame ms | first third | last third | blocks a frame | "
+      "ns/voxel | map blocks | bytes/voxel |\n");
+  std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+  double blocks_at_2cm = 0, one_thread = 0, two_threads = 0;
+  for (const double voxel : {0.01, 0.02, 0.05})
+    for (const size_t threads : {1, 2})
+      for (const bool color : {false, true}) {
+        const Cost c = fuse_all(color ? colored : frames, voxel, threads);
+        if (voxel == 0.02 && !color)
+          (threads == 1 ? one_thread : two_threads) = c.total_ms, blocks_at_2cm = c.blocks_per_frame;
+        std::printf("| %g cm | %zu | %s | %.3f | %.3f | **%.3f** | %.3f | %.3f | %.0f | %.2f | %zu | %.2f |\n",
+                    voxel * 100, threads, color ? "yes" : "no", c.allocate_ms, c.fuse_ms, c.total_ms, c.first_third_ms,
+                    c.last_third_ms, c.blocks_per_frame, c.total_ms * 1e6 / (c.blocks_per_frame * kBlockVoxels),
+                    c.blocks, c.bytes_per_voxel);
+      }
+  const double bound = bound_ms(frames, blocks_at_2cm);
+  std::printf("2 cm, depth only: %.3f ms a frame, bound %.3f ms: %.1f times the bound; two threads %.2f times one\n",
+              one_thread, bound, one_thread / bound, one_thread / two_threads);
+}

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "io/open_sequence.h"
+
+namespace felt::bench {
+
+/// Folder of a recorded sequence below FELTMAP_DATA (default ../shared/data); ends the program with a clear message
+/// where it is absent.
+inline std::filesystem::path recorded(const std::string& name) {
+  const char* set = std::getenv("FELTMAP_DATA");
+  const std::filesystem::path folder = std::filesystem::path(set != nullptr ? set : "../shared/data") / name;
+  if (std::filesystem::exists(folder)) return folder;
+  std::printf("skipped: no recorded data '%s'; set FELTMAP_DATA to its folder\n", folder.c_str());
+  std::exit(0);
+}
+
+/// Every usable frame of a sequence, decoded.
+inline std::vector<Frame> decoded(const std::string& name, const SequenceOptions& options = {}) {
+  const std::unique_ptr<SequenceReader> reader = open_sequence(recorded(name), options);
+  std::vector<Frame> frames;
+  for (int64_t i = 0; i < reader->size(); ++i) {
+    ReadResult result = reader->read(i);
+    if (Frame* frame = std::get_if<Frame>(&result)) frames.push_back(std::move(*frame));
+  }
+  return frames;
+}
+
+inline double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + long(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+template <typename F>
+double seconds(F&& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace felt::bench
