@@ -9,6 +9,7 @@
 #include "bench/support/bench.h"
 #include "core/simd.h"
 #include "mapping/tsdf_integrator.h"
+#include "mapping/vdb_views.h"
 
 namespace {
 
@@ -20,6 +21,7 @@ struct Cost {
   double blocks_per_frame = 0, voxels_per_frame = 0;
   size_t blocks = 0;
   double bytes_per_voxel = 0;
+  double stock_bytes_per_voxel = 0;  // of the same values as live OpenVDB grids
 };
 
 Cost fuse_all(const std::vector<Frame>& frames, double voxel_size_m, size_t threads) {
@@ -40,6 +42,9 @@ Cost fuse_all(const std::vector<Frame>& frames, double voxel_size_m, size_t thre
     }
     cost.blocks_per_frame = double(blocks) / double(frames.size());
     cost.blocks = map.store.size();
+    if (repetition == 0)
+      cost.stock_bytes_per_voxel = double(tsdf_grid(map)->memUsage() + weight_grid(map)->memUsage()) /
+                                   double(tsdf_grid(map)->tree().leafCount() * kBlockVoxels);
     cost.bytes_per_voxel = double(map.store.geometry_bytes()) / double(map.store.size() * kBlockVoxels);
   }
   const auto ms = [](std::vector<double> s) { return 1e3 * bench::median(std::move(s)); };
@@ -90,8 +95,8 @@ int main(int argc, char** argv) {
               frames.size(), frames[0].depth_m.width(), frames[0].depth_m.height(), simd_name().c_str());
   std::printf(
       "| voxel | threads | colour | allocate ms | fuse ms | frame ms | first third | last third | blocks a frame | "
-      "ns/voxel | map blocks | bytes/voxel |\n");
-  std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+      "ns/voxel | map blocks | bytes/voxel | as two FloatGrids |\n");
+  std::printf("|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   double blocks_at_2cm = 0, one_thread = 0, two_threads = 0;
   for (const double voxel : {0.01, 0.02, 0.05})
     for (const size_t threads : {1, 2})
@@ -99,10 +104,10 @@ int main(int argc, char** argv) {
         const Cost c = fuse_all(color ? colored : frames, voxel, threads);
         if (voxel == 0.02 && !color)
           (threads == 1 ? one_thread : two_threads) = c.total_ms, blocks_at_2cm = c.blocks_per_frame;
-        std::printf("| %g cm | %zu | %s | %.3f | %.3f | **%.3f** | %.3f | %.3f | %.0f | %.2f | %zu | %.2f |\n",
+        std::printf("| %g cm | %zu | %s | %.3f | %.3f | **%.3f** | %.3f | %.3f | %.0f | %.2f | %zu | %.2f | %.2f |\n",
                     voxel * 100, threads, color ? "yes" : "no", c.allocate_ms, c.fuse_ms, c.total_ms, c.first_third_ms,
                     c.last_third_ms, c.blocks_per_frame, c.total_ms * 1e6 / (c.blocks_per_frame * kBlockVoxels),
-                    c.blocks, c.bytes_per_voxel);
+                    c.blocks, c.bytes_per_voxel, c.stock_bytes_per_voxel);
       }
   const double bound = bound_ms(frames, blocks_at_2cm);
   std::printf("2 cm, depth only: %.3f ms a frame, bound %.3f ms: %.1f times the bound; two threads %.2f times one\n",
