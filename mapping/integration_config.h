@@ -17,6 +17,16 @@ enum class WeightModel {
                    ///< (Kinect)
 };
 
+/// Settings of class fusion.
+struct LabelConfig {
+  /// Voxels nearer than this to the surface take labels, in voxels: a band of its own, not the truncation, so that
+  /// labels do not bleed through thin things.
+  float band_vox = 1.0f;
+  float evidence = 1.0f;       ///< what one observation adds: below 1 tempers correlated frames
+  float max_evidence = 0.0f;   ///< cap of a voxel's total evidence; older evidence fades beyond it; 0: no cap
+  bool spread_dropped = true;  ///< of top-m probabilities: what the kept classes lack goes to the others evenly
+};
+
 /// Settings of depth fusion that do not change between frames.
 struct IntegrationConfig {
   float min_depth_m = 0.1f;  ///< nearer pixels are not used
@@ -28,6 +38,7 @@ struct IntegrationConfig {
   float dropoff_start_vox = 1.0f;
   /// Also fuse "free" (+truncation) into observed voxels in front of the band, as far as blocks exist.
   bool carve = false;
+  LabelConfig labels;
 };
 
 }  // namespace felt

@@ -102,20 +102,32 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
   const auto fusing = Clock::now();
   const DepthView view = depth_view(frame, config, map, depth_scale(frame, config, scratch));
   const auto* rgba = reinterpret_cast<const uint32_t*>(frame.color.data());
+  const bool labelled = map.classes.size() > 0 && (!frame.labels.empty() || !frame.probabilities.empty());
+  const LabelView labels{.classes = &map.classes,
+                         .labels = &frame.labels,
+                         .probabilities = &frame.probabilities,
+                         .config = config.labels,
+                         .band_m = float(config.labels.band_vox * map.voxel_size_m)};
   std::atomic<size_t> updated{0};
+  std::atomic<uint64_t> label_voxels{0}, label_unknown{0};
   tbb::parallel_for(tbb::blocked_range<size_t>(0, coords.size(), 16), [&](const tbb::blocked_range<size_t>& range) {
     BlockObservation observation;
     size_t observed = 0;
+    LabelStats label_stats;
     for (size_t n = range.begin(); n < range.end(); ++n) {
       Block& block = map.store[scratch.blocks[n]];
       if (!observe_block(coords[n], view, observation)) continue;
       ++observed;
       fuse_tsdf(observation, view.max_weight, *block.geometry);
       if (block.color != nullptr && rgba != nullptr) fuse_color(observation, rgba, view.truncation_m, *block.color);
+      if (labelled) label_stats += fuse_labels(observation, labels, block, map.store);
     }
     updated.fetch_add(observed, std::memory_order_relaxed);
+    label_voxels.fetch_add(label_stats.voxels, std::memory_order_relaxed);
+    label_unknown.fetch_add(label_stats.unknown, std::memory_order_relaxed);
   });
   stats.blocks_updated = updated;
+  stats.labels = {label_voxels, label_unknown};
   stats.fuse_s = seconds_since(fusing);
   return stats;
 }

@@ -5,6 +5,7 @@
 #include "core/frame.h"
 #include "mapping/block_allocation.h"
 #include "mapping/integration_config.h"
+#include "mapping/label_fusion.h"
 #include "mapping/map.h"
 #include "mapping/tsdf_kernels.h"
 
@@ -15,8 +16,9 @@ struct FrameStats {
   size_t blocks_in_view = 0;  ///< blocks near the measured surface
   size_t blocks_created = 0;
   size_t blocks_updated = 0;  ///< blocks with at least one observed voxel
-  double allocate_s = 0;      ///< finding and creating blocks
-  double fuse_s = 0;          ///< updating every channel
+  LabelStats labels;
+  double allocate_s = 0;  ///< finding and creating blocks
+  double fuse_s = 0;      ///< updating every channel
 };
 
 /// Working memory of `integrate`, reused from frame to frame.

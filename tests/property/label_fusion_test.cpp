@@ -1,0 +1,154 @@
+#include <catch2/catch.hpp>
+#include <map>
+
+#include "mapping/tsdf_integrator.h"
+#include "tests/support/views.h"
+
+using namespace felt;
+using felt::test::ball_before_wall;
+using felt::test::jittered_pose;
+using felt::test::Random;
+
+namespace {
+
+ClassTable table(int k) {
+  std::vector<ClassInfo> classes = {{0, "nothing", {}, true}};
+  for (int i = 1; i <= k; ++i) classes.push_back({uint16_t(3 * i), "class " + std::to_string(i), {}, false});
+  return ClassTable(classes);
+}
+
+Frame labelled_frame(Random& random, int k) {
+  Frame frame = ball_before_wall(jittered_pose(random));
+  frame.labels = LabelImage(frame.depth_m.width(), frame.depth_m.height());
+  for (uint16_t& id : frame.labels) id = uint16_t(random() * 3 * (k + 2));  // known, ignored and unknown ids
+  return frame;
+}
+
+double evidence(const Map& map, const Index3& voxel, uint16_t slot) {
+  const Block* block = map.store.get(block_of_voxel(voxel));
+  if (block == nullptr) return 0;
+  for (const EvidencePlane& e : block->evidence)
+    if (e.slot == slot) return e.counts->value[offset_in_block(voxel)];
+  return 0;
+}
+
+/// Visits every voxel that a view observes within the band, with its pixel.
+template <typename Visit>
+void visit_band(const Map& map, const Frame& frame, const IntegrationConfig& config, Visit visit) {
+  const DepthView view = depth_view(frame, config, map, nullptr);
+  for (const Block& block : map.store.blocks()) {
+    BlockObservation seen;
+    if (!observe_block_scalar(block.coord, view, seen)) continue;
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      if ((seen.valid[i >> 3] >> (i & 7) & 1) == 0) continue;
+      if (!(std::abs(seen.sdf_m[i]) < float(config.labels.band_vox * map.voxel_size_m))) continue;
+      const Index3 first = first_voxel(block.coord), in = voxel_of_offset(i);
+      visit(Index3{first.x + in.x, first.y + in.y, first.z + in.z}, seen.pixel[i]);
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("class counts are exact: they equal a dictionary's, unknown and ignored ids are left out") {
+  for (const int k : {2, 40, 150}) {
+    Map map(0.03, 0.12);
+    map.classes = table(k);
+    IntegrationScratch scratch;
+    const IntegrationConfig config;
+    Random random{uint64_t(k)};
+    std::map<std::pair<Index3, uint16_t>, double> dictionary;
+    uint64_t unknown = 0, fused = 0, expected_unknown = 0;
+    for (int n = 0; n < 4; ++n) {
+      const Frame frame = labelled_frame(random, k);
+      const FrameStats stats = integrate(map, frame, config, scratch);
+      unknown += stats.labels.unknown, fused += stats.labels.voxels;
+      visit_band(map, frame, config, [&](const Index3& voxel, int pixel) {
+        const uint16_t id = frame.labels.data()[pixel];
+        const bool is_class = id % 3 == 0 && id > 0 && id <= 3 * k;
+        if (is_class) dictionary[{voxel, uint16_t(id / 3 - 1)}] += 1;
+        expected_unknown += !is_class && id != 0;
+      });
+    }
+    REQUIRE(dictionary.size() > 1000);
+    CHECK(unknown == expected_unknown);
+    double stored = 0, counted = 0;
+    for (const auto& [key, count] : dictionary) {
+      REQUIRE(evidence(map, key.first, key.second) == count);
+      counted += count;
+    }
+    for (const Block& block : map.store.blocks())
+      for (const EvidencePlane& e : block.evidence)
+        for (const float v : e.counts->value) stored += v;
+    CHECK(stored == counted);
+    CHECK(double(fused) == counted);
+  }
+}
+
+TEST_CASE("a pixel's probabilities add one unit of evidence however many classes were kept") {
+  for (const bool spread : {true, false}) {
+    Map map(0.03, 0.12);
+    map.classes = table(5);
+    IntegrationConfig config;
+    config.labels.spread_dropped = spread;
+    Random random(4);
+    Frame frame = ball_before_wall(jittered_pose(random));
+    ProbabilityImage& p = frame.probabilities;
+    p.width = frame.depth_m.width(), p.height = frame.depth_m.height(), p.top = 2;
+    for (size_t i = 0; i < frame.depth_m.size(); ++i) {
+      p.class_id.insert(p.class_id.end(), {6, 12});
+      p.probability.insert(p.probability.end(), {0.5f, 0.25f});
+    }
+    IntegrationScratch scratch;
+    const FrameStats stats = integrate(map, frame, config, scratch);
+    REQUIRE(stats.labels.voxels > 500);
+    visit_band(map, frame, config, [&](const Index3& voxel, int) {
+      REQUIRE(evidence(map, voxel, 1) == 0.5);
+      REQUIRE(evidence(map, voxel, 3) == 0.25);
+      double total = 0;
+      for (uint16_t slot = 0; slot < 5; ++slot) total += evidence(map, voxel, slot);
+      REQUIRE(total == Approx(spread ? 1.0 : 0.75));
+      REQUIRE(evidence(map, voxel, 0) == Approx(spread ? 0.25 / 3 : 0.0));
+    });
+  }
+}
+
+TEST_CASE("capped evidence forgets the past and keeps its total") {
+  Map map(0.03, 0.12);
+  map.classes = table(2);
+  IntegrationConfig config;
+  config.labels.max_evidence = 5;
+  IntegrationScratch scratch;
+  Frame frame = ball_before_wall(Eigen::Isometry3d::Identity());
+  frame.labels = LabelImage(frame.depth_m.width(), frame.depth_m.height(), 3);
+  for (int n = 0; n < 50; ++n) integrate(map, frame, config, scratch);
+  std::fill(frame.labels.begin(), frame.labels.end(), uint16_t(6));
+  int needed = 0;
+  const Index3 voxel{0, 0, 37};  // on the ball's front, at 1.11 m
+  REQUIRE(evidence(map, voxel, 0) == Approx(5));
+  while (evidence(map, voxel, 1) < evidence(map, voxel, 0) && needed < 100) {
+    integrate(map, frame, config, scratch);
+    ++needed;
+    CHECK(evidence(map, voxel, 0) + evidence(map, voxel, 1) == Approx(5));
+  }
+  CHECK(needed <= 4);  // 5 (4/5)^n <= 2.5 from n = 4 on
+}
+
+TEST_CASE("a voxel behind another surface takes no label from it") {
+  Map map(0.02, 0.08);
+  map.classes = table(2);
+  IntegrationScratch scratch;
+  Frame frame = ball_before_wall(Eigen::Isometry3d::Identity());
+  frame.labels = LabelImage(frame.depth_m.width(), frame.depth_m.height(), 3);  // the wall and the ball's front
+  integrate(map, frame, {}, scratch);
+  for (const Block& block : map.store.blocks())
+    for (const EvidencePlane& e : block.evidence)
+      for (int i = 0; i < kBlockVoxels; ++i) {
+        if (e.counts->value[i] == 0) continue;
+        const Index3 first = first_voxel(block.coord), in = voxel_of_offset(i);
+        const Eigen::Vector3d p = Eigen::Vector3d(first.x + in.x, first.y + in.y, first.z + in.z) * 0.02;
+        const double to_ball = std::abs((p - Eigen::Vector3d(0, 0, 1.4)).norm() - 0.3), to_wall = std::abs(p.z() - 2.0);
+        REQUIRE(std::min(to_ball, to_wall) < 0.06);
+        REQUIRE((p.z() < 1.4 || to_wall < 0.021));  // not inside the ball's back half
+      }
+}
