@@ -19,8 +19,8 @@ namespace HWY_NAMESPACE {
 class Row {
 public:
   Row(float* at, size_t lanes) : at_(at), lanes_(lanes) {}
-  HWY_INLINE V load(size_t c) const { return hn::LoadU(F(), at_ + c * lanes_); }
-  HWY_INLINE void store(V x, size_t c) const { hn::StoreU(x, F(), at_ + c * lanes_); }
+  HWY_INLINE V load(size_t c) const { return pair::LoadU(at_ + c * lanes_); }
+  HWY_INLINE void store(V x, size_t c) const { pair::StoreU(x, at_ + c * lanes_); }
 
 private:
   float* at_;
@@ -38,28 +38,30 @@ HWY_INLINE DigammaEnd digamma_end(V x) {
 }
 
 HWY_INLINE DigammaEnd select(M where, const DigammaEnd& yes, const DigammaEnd& no) {
-  return {hn::IfThenElse(where, yes.inv_x, no.inv_x), hn::IfThenElse(where, yes.t, no.t),
-          hn::IfThenElse(where, yes.shifted, no.shifted)};
+  return {pair::IfThenElse(where, yes.inv_x, no.inv_x), pair::IfThenElse(where, yes.t, no.t),
+          pair::IfThenElse(where, yes.shifted, no.shifted)};
 }
 
 /// digamma(x + u) - digamma(x), by digamma(x) = ln(1 + x) - 1/x - D(1 + x): no term is larger than 1/x.
 HWY_INLINE V digamma_difference(const DigammaEnd& x, V u, const DigammaEnd& end) {
-  const V of_log = log1p_of(hn::Mul(u, x.t)).log;
-  const V of_inverse = hn::Mul(hn::Mul(u, x.inv_x), end.inv_x);
-  return hn::Add(of_log, hn::Add(of_inverse, hn::Sub(x.shifted, end.shifted)));
+  const V of_log = log1p_of(pair::Mul(u, x.t)).log;
+  const V of_inverse = pair::Mul(pair::Mul(u, x.inv_x), end.inv_x);
+  return pair::Add(of_log, pair::Add(of_inverse, pair::Sub(x.shifted, end.shifted)));
 }
 
 /// Sum of positive numbers, and for each of them the sum of the others without cancellation.
 class SumOfOthers {
 public:
-  HWY_INLINE SumOfOthers() : largest_(hn::Zero(F())), others_of_largest_(hn::Zero(F())) {}
+  HWY_INLINE SumOfOthers() : largest_(pair::Zero()), others_of_largest_(pair::Zero()) {}
 
   HWY_INLINE void add(V x) {
-    others_of_largest_ = hn::Add(others_of_largest_, hn::Min(largest_, x));
-    largest_ = hn::Max(largest_, x);
+    others_of_largest_ = pair::Add(others_of_largest_, pair::Min(largest_, x));
+    largest_ = pair::Max(largest_, x);
   }
-  HWY_INLINE V sum() const { return hn::Add(largest_, others_of_largest_); }
-  HWY_INLINE V others(V x) const { return hn::IfThenElse(hn::Eq(x, largest_), others_of_largest_, hn::Sub(sum(), x)); }
+  HWY_INLINE V sum() const { return pair::Add(largest_, others_of_largest_); }
+  HWY_INLINE V others(V x) const {
+    return pair::IfThenElse(pair::Eq(x, largest_), others_of_largest_, pair::Sub(sum(), x));
+  }
 
 private:
   V largest_, others_of_largest_;
@@ -71,7 +73,7 @@ struct DirichletRows {
   Row step;  ///< result: out - a
   Row inv_a, t_a, shifted_a, share_term, residual, slope;
 
-  HWY_INLINE V x(size_t c) const { return hn::Max(hn::Add(a.load(c), step.load(c)), constant(kLeastCount)); }
+  HWY_INLINE V x(size_t c) const { return pair::Max(pair::Add(a.load(c), step.load(c)), constant(kLeastCount)); }
   HWY_INLINE DigammaEnd end_of_a(size_t c) const { return {inv_a.load(c), t_a.load(c), shifted_a.load(c)}; }
 };
 
@@ -86,19 +88,19 @@ constexpr int kMostNewtonSteps = 40;
 /// differences to the total instead wherever those are smaller. (A lane's result never depends on the other lanes.)
 template <bool kDominant>
 HWY_INLINE void iterate_dirichlet(const DirichletRows& rows, size_t k, V total, M live, M dominant) {
-  const V one = constant(1.0f), half = constant(0.5f), zero = hn::Zero(F());
+  const V one = constant(1.0f), half = constant(0.5f), zero = pair::Zero();
   const DigammaEnd total_end = digamma_end(total);
   for (int iteration = 0; iteration < kMostNewtonSteps; ++iteration) {
     V sum_step = zero;
     SumOfOthers sum_x;
     for (size_t c = 0; c < k; ++c) {
-      sum_step = hn::Add(sum_step, rows.step.load(c));
+      sum_step = pair::Add(sum_step, rows.step.load(c));
       if (kDominant) sum_x.add(rows.x(c));
     }
-    V s = hn::Max(hn::Add(total, sum_step), constant(kLeastCount));
-    if (kDominant) s = hn::IfThenElse(dominant, sum_x.sum(), s);
+    V s = pair::Max(pair::Add(total, sum_step), constant(kLeastCount));
+    if (kDominant) s = pair::IfThenElse(dominant, sum_x.sum(), s);
     const DigammaEnd s_end = digamma_end(s);
-    const V of_total = hn::Sub(digamma_difference(total_end, sum_step, s_end), total_end.inv_x);
+    const V of_total = pair::Sub(digamma_difference(total_end, sum_step, s_end), total_end.inv_x);
     V sum_g = zero, sum_w = zero;
     for (size_t c = 0; c < k; ++c) {
       const V u = rows.step.load(c), x = rows.x(c);
@@ -106,52 +108,55 @@ HWY_INLINE void iterate_dirichlet(const DirichletRows& rows, size_t k, V total, 
       V residual;
       if (kDominant) {
         const V others = sum_x.others(x);
-        const M near_total = hn::And(dominant, hn::Lt(hn::Mul(others, x_end.inv_x), hn::Mul(hn::Abs(u), a_end.inv_x)));
-        const V difference = digamma_difference(select(near_total, x_end, a_end), hn::IfThenElse(near_total, others, u),
-                                                select(near_total, s_end, x_end));
-        residual = hn::IfThenElse(near_total, hn::Add(rows.share_term.load(c), difference),
-                                  hn::Sub(hn::MulAdd(rows.r.load(c), a_end.inv_x, of_total), difference));
+        const M near_total =
+            pair::And(dominant, pair::Lt(pair::Mul(others, x_end.inv_x), pair::Mul(pair::Abs(u), a_end.inv_x)));
+        const V difference =
+            digamma_difference(select(near_total, x_end, a_end), pair::IfThenElse(near_total, others, u),
+                               select(near_total, s_end, x_end));
+        residual = pair::IfThenElse(near_total, pair::Add(rows.share_term.load(c), difference),
+                                    pair::Sub(pair::MulAdd(rows.r.load(c), a_end.inv_x, of_total), difference));
       } else {
-        residual = hn::Sub(hn::MulAdd(rows.r.load(c), a_end.inv_x, of_total), digamma_difference(a_end, u, x_end));
+        residual = pair::Sub(pair::MulAdd(rows.r.load(c), a_end.inv_x, of_total), digamma_difference(a_end, u, x_end));
       }
       const V excess = trigamma_excess(x_end.t);
-      const V slope = hn::Div(x, hn::Add(x, excess));  // 1/(x trigamma(x))
-      sum_g = hn::MulAdd(hn::Mul(residual, x), slope, sum_g);
-      sum_w = hn::MulAdd(excess, slope, sum_w);
+      const V slope = pair::Div(x, pair::Add(x, excess));  // 1/(x trigamma(x))
+      sum_g = pair::MulAdd(pair::Mul(residual, x), slope, sum_g);
+      sum_w = pair::MulAdd(excess, slope, sum_w);
       rows.residual.store(residual, c);
       rows.slope.store(slope, c);
     }
     const V s_excess = trigamma_excess(s_end.t);
-    const V s_slope = hn::Div(s, hn::Add(s, s_excess));
-    const V inv_rank_one = hn::Div(one, hn::NegMulAdd(s_excess, s_slope, sum_w));
-    const V common = hn::Mul(sum_g, inv_rank_one);  // change of digamma(sum out)
+    const V s_slope = pair::Div(s, pair::Add(s, s_excess));
+    const V inv_rank_one = pair::Div(one, pair::NegMulAdd(s_excess, s_slope, sum_w));
+    const V common = pair::Mul(sum_g, inv_rank_one);  // change of digamma(sum out)
 
     V sum_linear = zero, bend = zero;
     for (size_t c = 0; c < k; ++c) {
       const V slope = rows.slope.load(c);
-      const V relative = hn::Mul(hn::Add(rows.residual.load(c), common), slope);
-      const V linear = hn::Mul(rows.x(c), relative);
-      sum_linear = hn::Add(sum_linear, linear);
-      bend = hn::MulAdd(hn::NegMulAdd(half, slope, one), hn::Mul(linear, clamp_to(relative, -0.5f, 0.5f)), bend);
+      const V relative = pair::Mul(pair::Add(rows.residual.load(c), common), slope);
+      const V linear = pair::Mul(rows.x(c), relative);
+      sum_linear = pair::Add(sum_linear, linear);
+      bend = pair::MulAdd(pair::NegMulAdd(half, slope, one), pair::Mul(linear, clamp_to(relative, -0.5f, 0.5f)), bend);
     }
-    const V s_relative = clamp_to(hn::Mul(sum_linear, s_end.inv_x), -0.5f, 0.5f);
-    bend = hn::NegMulAdd(hn::NegMulAdd(half, s_slope, one), hn::Mul(sum_linear, s_relative), bend);
-    const V limit = hn::Mul(half, hn::Abs(common));
-    const V second = hn::Max(hn::Neg(limit), hn::Min(limit, hn::Mul(bend, inv_rank_one)));
+    const V s_relative = clamp_to(pair::Mul(sum_linear, s_end.inv_x), -0.5f, 0.5f);
+    bend = pair::NegMulAdd(pair::NegMulAdd(half, s_slope, one), pair::Mul(sum_linear, s_relative), bend);
+    const V limit = pair::Mul(half, pair::Abs(common));
+    const V second = pair::Max(pair::Neg(limit), pair::Min(limit, pair::Mul(bend, inv_rank_one)));
 
     V largest = zero;
     for (size_t c = 0; c < k; ++c) {
       const V slope = rows.slope.load(c);
-      const V relative = hn::Mul(hn::Add(rows.residual.load(c), common), slope);
-      const V curvature = hn::Mul(hn::NegMulAdd(half, slope, one), relative);
-      const V bent = hn::Div(hn::MulAdd(second, slope, relative), hn::Sub(one, hn::Min(curvature, constant(0.75f))));
-      const V moved = hn::IfThenElseZero(live, hn::Max(bent, constant(-0.875f)));  // stays positive
-      largest = hn::Max(largest, hn::Abs(moved));
-      rows.step.store(hn::MulAdd(rows.x(c), moved, rows.step.load(c)), c);
+      const V relative = pair::Mul(pair::Add(rows.residual.load(c), common), slope);
+      const V curvature = pair::Mul(pair::NegMulAdd(half, slope, one), relative);
+      const V bent =
+          pair::Div(pair::MulAdd(second, slope, relative), pair::Sub(one, pair::Min(curvature, constant(0.75f))));
+      const V moved = pair::IfThenElseZero(live, pair::Max(bent, constant(-0.875f)));  // stays positive
+      largest = pair::Max(largest, pair::Abs(moved));
+      rows.step.store(pair::MulAdd(rows.x(c), moved, rows.step.load(c)), c);
     }
     // Third order: a step of 5e-3 leaves 1e-5. A voxel that is done stays as it is, whatever its neighbours need.
-    live = hn::And(live, hn::Gt(largest, constant(5e-3f)));
-    if (hn::AllFalse(F(), live)) break;
+    live = pair::And(live, pair::Gt(largest, constant(5e-3f)));
+    if (pair::AllFalse(live)) break;
   }
 }
 
@@ -159,25 +164,25 @@ HWY_INLINE void iterate_dirichlet(const DirichletRows& rows, size_t k, V total, 
 HWY_INLINE void project_dirichlet(const DirichletRows& rows, size_t k, V total, V overlap, V cross, M live) {
   const V one = constant(1.0f);
   // S/(A + 1) - 1 for the S that matches sum E[w_i^2]; start at out_i = (a_i + r_i) S/(A + 1).
-  const V scale = hn::Neg(
-      hn::Div(hn::Mul(hn::Add(total, constant(2.0f)), overlap), hn::MulAdd(hn::Add(total, one), overlap, cross)));
-  V sum_x = hn::Zero(F()), largest_x = sum_x, most_moved = sum_x;
+  const V scale = pair::Neg(pair::Div(pair::Mul(pair::Add(total, constant(2.0f)), overlap),
+                                      pair::MulAdd(pair::Add(total, one), overlap, cross)));
+  V sum_x = pair::Zero(), largest_x = sum_x, most_moved = sum_x;
   for (size_t c = 0; c < k; ++c) {
     const V a = rows.a.load(c), r = rows.r.load(c);
     const DigammaEnd end = digamma_end(a);
-    const V step = hn::Max(hn::MulAdd(hn::Add(a, r), scale, r), hn::Mul(a, constant(-0.99f)));
+    const V step = pair::Max(pair::MulAdd(pair::Add(a, r), scale, r), pair::Mul(a, constant(-0.99f)));
     rows.inv_a.store(end.inv_x, c);
     rows.t_a.store(end.t, c);
     rows.shifted_a.store(end.shifted, c);
     rows.step.store(step, c);
-    const V x = hn::Add(a, step);
-    const M larger = hn::Gt(x, largest_x);
-    most_moved = hn::IfThenElse(larger, hn::Mul(hn::Abs(step), end.inv_x), most_moved);
-    largest_x = hn::Max(largest_x, x);
-    sum_x = hn::Add(sum_x, x);
+    const V x = pair::Add(a, step);
+    const M larger = pair::Gt(x, largest_x);
+    most_moved = pair::IfThenElse(larger, pair::Mul(pair::Abs(step), end.inv_x), most_moved);
+    largest_x = pair::Max(largest_x, x);
+    sum_x = pair::Add(sum_x, x);
   }
-  const M dominant = hn::Lt(hn::Sub(sum_x, largest_x), hn::Mul(hn::Mul(constant(2.0f), largest_x), most_moved));
-  if (hn::AllFalse(F(), hn::And(dominant, live))) return iterate_dirichlet<false>(rows, k, total, live, dominant);
+  const M dominant = pair::Lt(pair::Sub(sum_x, largest_x), pair::Mul(pair::Mul(constant(2.0f), largest_x), most_moved));
+  if (pair::AllFalse(pair::And(dominant, live))) return iterate_dirichlet<false>(rows, k, total, live, dominant);
 
   // E[ln w_i] + digamma(A + 1 - 1) - digamma(a_i) - 1/A, with r/a - 1/A over one denominator.
   SumOfOthers sum_a;
@@ -186,9 +191,10 @@ HWY_INLINE void project_dirichlet(const DirichletRows& rows, size_t k, V total, 
   for (size_t c = 0; c < k; ++c) {
     const V a = rows.a.load(c), others = sum_a.others(a);
     const DigammaEnd a_end = rows.end_of_a(c);
-    const V gain = hn::MulSub(others, rows.r.load(c), hn::Mul(a, rows.not_r.load(c)));
-    rows.share_term.store(
-        hn::Sub(hn::Mul(hn::Mul(gain, a_end.inv_x), total_end.inv_x), digamma_difference(a_end, others, total_end)), c);
+    const V gain = pair::MulSub(others, rows.r.load(c), pair::Mul(a, rows.not_r.load(c)));
+    rows.share_term.store(pair::Sub(pair::Mul(pair::Mul(gain, a_end.inv_x), total_end.inv_x),
+                                    digamma_difference(a_end, others, total_end)),
+                          c);
   }
   iterate_dirichlet<true>(rows, k, total, live, dominant);
 }

@@ -17,38 +17,38 @@ namespace HWY_NAMESPACE {
 /// out[i] = f(x[i], y[i]); the last vector is padded with ones.
 template <class Function>
 HWY_INLINE void map(const float* x, const float* y, size_t n, float* out, Function f) {
-  const size_t lanes = hn::Lanes(F());
+  const size_t lanes = pair::lanes();
   size_t i = 0;
-  for (; i + lanes <= n; i += lanes) hn::StoreU(f(hn::LoadU(F(), x + i), hn::LoadU(F(), y + i)), F(), out + i);
+  for (; i + lanes <= n; i += lanes) pair::StoreU(f(pair::LoadU(x + i), pair::LoadU(y + i)), out + i);
   if (i == n) return;
-  float padded_x[HWY_MAX_BYTES / sizeof(float)], padded_y[HWY_MAX_BYTES / sizeof(float)];
+  float padded_x[2 * HWY_MAX_BYTES / sizeof(float)], padded_y[2 * HWY_MAX_BYTES / sizeof(float)];
   std::fill_n(padded_x, lanes, 1.0f);
   std::fill_n(padded_y, lanes, 1.0f);
   std::copy(x + i, x + n, padded_x);
   std::copy(y + i, y + n, padded_y);
-  hn::StoreU(f(hn::LoadU(F(), padded_x), hn::LoadU(F(), padded_y)), F(), padded_x);
+  pair::StoreU(f(pair::LoadU(padded_x), pair::LoadU(padded_y)), padded_x);
   std::copy_n(padded_x, n - i, out + i);
 }
 
 HWY_INLINE V trigamma_of(V x) {
   const V t = reciprocals(x).of_x_plus_1;
-  const V inverse = hn::Div(constant(1.0f), x);
-  return hn::Mul(inverse, hn::MulAdd(trigamma_excess(t), inverse, constant(1.0f)));
+  const V inverse = pair::Div(constant(1.0f), x);
+  return pair::Mul(inverse, pair::MulAdd(trigamma_excess(t), inverse, constant(1.0f)));
 }
 
 HWY_INLINE V log_gamma_half_step_of(V x) {
   const V w = half_step_excess(reciprocals(x).of_x_plus_1);
   // ln x + ln(x/(x + w)), each within the range of f32 where x^2 is not.
-  return hn::Mul(constant(0.5f), hn::Add(log_of(x), log_of(hn::Div(x, hn::Add(x, w)))));
+  return pair::Mul(constant(0.5f), pair::Add(log_of(x), log_of(pair::Div(x, pair::Add(x, w)))));
 }
 
-HWY_INLINE V digamma_of(V x) { return hn::Sub(log_of(x), log_minus_digamma_of(reciprocals(x))); }
+HWY_INLINE V digamma_of(V x) { return pair::Sub(log_of(x), log_minus_digamma_of(reciprocals(x))); }
 
 HWY_INLINE V inverse_of(V s) { return inverse_log_minus_digamma_of(s, constant(1.0f), constant(0.577215665f)); }
 
 HWY_INLINE V log_gamma_difference_of(V x, V h) {
-  const V end = hn::Add(constant(1.0f), hn::Add(x, h));
-  return hn::MulAdd(h, log_of(end), log_gamma_difference_less_log(x, h));
+  const V end = pair::Add(constant(1.0f), pair::Add(x, h));
+  return pair::MulAdd(h, log_of(end), log_gamma_difference_less_log(x, h));
 }
 
 void LogArray(const float* x, const float* y, size_t n, float* out) {

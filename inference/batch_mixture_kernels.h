@@ -9,8 +9,8 @@
 
 namespace felt {
 
-/// Kernels work on whole vectors: voxel counts are multiples of this (the widest vector's floats).
-inline constexpr size_t kBatchLanes = 16;
+/// Kernels work on whole vectors: voxel counts are multiples of this (two of the widest vectors).
+inline constexpr size_t kBatchLanes = 32;
 
 /// What the kernels need of one reading.
 struct MixtureReading {

@@ -25,24 +25,25 @@ public:
       : batch_(batch),
         reading_(reading),
         k_(batch.classes.size()),
-        lanes_(hn::Lanes(F())),
+        lanes_(pair::lanes()),
         rows_(scratch),
         noise_variance_(constant(float(std::min(reading.noise_sd * reading.noise_sd, 1e30)))) {}
 
   HWY_INLINE void update(size_t voxel) {
     read_as_each_class(voxel);
     weigh();
-    const V one = constant(1.0f), zero = hn::Zero(F());
+    const V one = constant(1.0f), zero = pair::Zero();
     V overlap = zero, cross = zero;
     for (size_t c = 0; c < k_; ++c) {
       const V a = row(kA).load(c), w = row(kWeight).load(c);
-      const V r = hn::Mul(w, inv_total_weight_);
-      const V not_r = hn::IfThenElse(hn::Eq(w, one), hn::Mul(other_weight_, inv_total_weight_), hn::Sub(one, r));
+      const V r = pair::Mul(w, inv_total_weight_);
+      const V not_r =
+          pair::IfThenElse(pair::Eq(w, one), pair::Mul(other_weight_, inv_total_weight_), pair::Sub(one, r));
       row(kWeight).store(r, c);
       row(kNotR).store(not_r, c);
       if (batch_.classes[c].tau != nullptr) project_nig(voxel, c, r, not_r);
-      overlap = hn::MulAdd(r, not_r, overlap);
-      cross = hn::MulAdd(hn::Add(a, r), hn::Add(hn::Sub(total_, a), not_r), cross);
+      overlap = pair::MulAdd(r, not_r, overlap);
+      cross = pair::MulAdd(pair::Add(a, r), pair::Add(pair::Sub(total_, a), not_r), cross);
       if (reading_.projection == Projection::published) {
         row(kStep).store(published_step(a, r, not_r), c);
       }
@@ -83,8 +84,8 @@ private:
 
   HWY_INLINE NigVectors load_nig(size_t voxel, size_t c) const {
     const MixturePlanes& p = batch_.classes[c];
-    return {hn::LoadU(F(), p.tau + voxel), hn::LoadU(F(), p.kappa + voxel), hn::LoadU(F(), p.beta + voxel),
-            hn::LoadU(F(), p.gamma + voxel)};
+    return {pair::LoadU(p.tau + voxel), pair::LoadU(p.kappa + voxel), pair::LoadU(p.beta + voxel),
+            pair::LoadU(p.gamma + voxel)};
   }
 
   /// psi - tau, exact to the last bit of the stored tau: psi less the origin is split in two floats.
@@ -92,45 +93,46 @@ private:
     const double psi =
         std::clamp(reading_.psi - batch_.classes[c].tau_origin, -double(kMostLocation), double(kMostLocation));
     const float high = float(psi);
-    return hn::Add(hn::Sub(constant(high), tau), constant(float(psi - double(high))));
+    return pair::Add(pair::Sub(constant(high), tau), constant(float(psi - double(high))));
   }
 
   /// s = v/(v + noise variance), v = gamma/beta: what a noisy reading counts.
   HWY_INLINE V tempering(const NigVectors& p) const {
     if (reading_.noise_sd == 0) return constant(1.0f);
-    return hn::Div(p.gamma, hn::MulAdd(p.beta, noise_variance_, p.gamma));
+    return pair::Div(p.gamma, pair::MulAdd(p.beta, noise_variance_, p.gamma));
   }
 
   HWY_INLINE void read_as_each_class(size_t voxel) {
     const V one = constant(1.0f), half = constant(0.5f);
-    total_ = taking_part_ = hn::Zero(F());
+    total_ = taking_part_ = pair::Zero();
     most_ = constant(-3e38f);
-    usable_ = hn::Eq(one, one);
-    too_noisy_ = hn::Lt(one, one);
+    usable_ = pair::Eq(one, one);
+    too_noisy_ = pair::Lt(one, one);
     for (size_t c = 0; c < k_; ++c) {
-      const V a = hn::LoadU(F(), batch_.classes[c].a + voxel);
+      const V a = pair::LoadU(batch_.classes[c].a + voxel);
       row(kA).store(a, c);
-      total_ = hn::Add(total_, a);
-      usable_ = hn::And(usable_, is_count(a));
+      total_ = pair::Add(total_, a);
+      usable_ = pair::And(usable_, is_count(a));
       if (batch_.classes[c].tau == nullptr) continue;
-      taking_part_ = hn::Add(taking_part_, a);
+      taking_part_ = pair::Add(taking_part_, a);
       const NigVectors p = load_nig(voxel, c);
-      usable_ = hn::And(usable_, is_usable(p));
+      usable_ = pair::And(usable_, is_usable(p));
       const V s = tempering(p);
-      too_noisy_ = hn::Or(too_noisy_, hn::Lt(s, constant(0.75f)));  // noise variance above v/3
-      const V inv_kappa = hn::Div(one, hn::Add(p.kappa, s));
-      const V kept = hn::Mul(p.kappa, hn::Mul(s, inv_kappa));
+      too_noisy_ = pair::Or(too_noisy_, pair::Lt(s, constant(0.75f)));  // noise variance above v/3
+      const V inv_kappa = pair::Div(one, pair::Add(p.kappa, s));
+      const V kept = pair::Mul(p.kappa, pair::Mul(s, inv_kappa));
       const V d = deviation(c, p.tau);
-      const V inv_gamma = hn::Div(one, p.gamma);
-      const V excess = hn::Min(hn::Mul(hn::Mul(hn::Mul(half, kept), hn::Mul(d, inv_gamma)), d), constant(1e30f));
+      const V inv_gamma = pair::Div(one, p.gamma);
+      const V excess =
+          pair::Min(pair::Mul(pair::Mul(pair::Mul(half, kept), pair::Mul(d, inv_gamma)), d), constant(1e30f));
       const Reciprocals of_beta = reciprocals(p.beta);
       // ln of a Student-t: G(b + 1/2)/G(b) = b/sqrt(b + w); kappa s/(kappa + s) b/gamma is the inverse squared scale.
-      const V shape = hn::Div(p.beta, hn::Add(p.beta, half_step_excess(of_beta.of_x_plus_1)));
-      const V inv_scale2 = hn::Mul(hn::Mul(p.beta, inv_gamma), hn::Mul(kept, shape));
-      const V log_density = hn::NegMulAdd(hn::Add(p.beta, half), log1p_of(excess).log,
-                                          hn::Mul(half, log_of(clamp_to(inv_scale2, 1.2e-38f, 3e38f))));
-      const V log_weight = hn::Add(log_of(a), log_density);
-      most_ = hn::Max(most_, log_weight);
+      const V shape = pair::Div(p.beta, pair::Add(p.beta, half_step_excess(of_beta.of_x_plus_1)));
+      const V inv_scale2 = pair::Mul(pair::Mul(p.beta, inv_gamma), pair::Mul(kept, shape));
+      const V log_density = pair::NegMulAdd(pair::Add(p.beta, half), log1p_of(excess).log,
+                                            pair::Mul(half, log_of(clamp_to(inv_scale2, 1.2e-38f, 3e38f))));
+      const V log_weight = pair::Add(log_of(a), log_density);
+      most_ = pair::Max(most_, log_weight);
       row(kWeight).store(log_weight, c);
       row(kBetaInverse).store(of_beta.of_x, c);
       row(kBetaT).store(of_beta.of_x_plus_1, c);
@@ -142,26 +144,26 @@ private:
   /// Weights relative to the largest. What the others weigh together is summed apart, so that 1 - r of the largest
   /// keeps its digits where r is within rounding of 1.
   HWY_INLINE void weigh() {
-    const V one = constant(1.0f), zero = hn::Zero(F());
+    const V one = constant(1.0f), zero = pair::Zero();
     V others = zero, largest = zero;
     for (size_t c = 0; c < k_; ++c) {
-      const V w = batch_.classes[c].tau == nullptr ? zero : exp_of_negative(hn::Sub(row(kWeight).load(c), most_));
+      const V w = batch_.classes[c].tau == nullptr ? zero : exp_of_negative(pair::Sub(row(kWeight).load(c), most_));
       row(kWeight).store(w, c);
-      const M ties = hn::Eq(w, one);
-      largest = hn::Add(largest, hn::IfThenElseZero(ties, one));
-      others = hn::Add(others, hn::IfThenZeroElse(ties, w));
+      const M ties = pair::Eq(w, one);
+      largest = pair::Add(largest, pair::IfThenElseZero(ties, one));
+      others = pair::Add(others, pair::IfThenZeroElse(ties, w));
     }
-    other_weight_ = hn::Add(others, hn::Sub(largest, one));
-    total_weight_ = hn::Add(one, other_weight_);
-    inv_total_weight_ = hn::Div(one, total_weight_);
+    other_weight_ = pair::Add(others, pair::Sub(largest, one));
+    total_weight_ = pair::Add(one, other_weight_);
+    inv_total_weight_ = pair::Div(one, total_weight_);
   }
 
   HWY_INLINE void project_nig(size_t voxel, size_t c, V r, V not_r) {
     const NigVectors p = load_nig(voxel, c);
     const Reciprocals of_beta{row(kBetaInverse).load(c), row(kBetaT).load(c)};
     const V s = tempering(p), inv_kappa = row(kInvKappa).load(c);
-    const NigUpdate u{hn::Mul(constant(0.5f), s), hn::Mul(s, row(kExcess).load(c)), inv_kappa,
-                      hn::Mul(hn::Mul(s, deviation(c, p.tau)), inv_kappa)};
+    const NigUpdate u{pair::Mul(constant(0.5f), s), pair::Mul(s, row(kExcess).load(c)), inv_kappa,
+                      pair::Mul(pair::Mul(s, deviation(c, p.tau)), inv_kappa)};
     const NigVectors out =
         reading_.projection == Projection::kl
             ? project_kl(p, of_beta, u, r, not_r)
@@ -174,42 +176,43 @@ private:
 
   /// a^ - a by E[w] (E[w] - E[w^2])/(E[w^2] - E[w]^2), all sums of positive terms.
   HWY_INLINE V published_step(V a, V r, V not_r) const {
-    const V others = hn::Sub(total_, a), x = hn::Add(a, r);
-    const V own = hn::Mul(a, hn::Add(others, not_r));
-    const V numerator = hn::MulAdd(others, r, own);
+    const V others = pair::Sub(total_, a), x = pair::Add(a, r);
+    const V own = pair::Mul(a, pair::Add(others, not_r));
+    const V numerator = pair::MulAdd(others, r, own);
     const V denominator =
-        hn::MulAdd(x, hn::Add(others, not_r), hn::Mul(hn::Mul(r, not_r), hn::Add(total_, constant(1.0f))));
-    return hn::Sub(hn::Div(hn::Mul(x, numerator), denominator), a);
+        pair::MulAdd(x, pair::Add(others, not_r), pair::Mul(pair::Mul(r, not_r), pair::Add(total_, constant(1.0f))));
+    return pair::Sub(pair::Div(pair::Mul(x, numerator), denominator), a);
   }
 
   HWY_INLINE void write(size_t voxel) const {
-    M valid = hn::AndNot(too_noisy_, usable_);
+    M valid = pair::AndNot(too_noisy_, usable_);
     for (size_t c = 0; c < k_; ++c) {
-      const V a = hn::Add(row(kA).load(c), row(kStep).load(c));
+      const V a = pair::Add(row(kA).load(c), row(kStep).load(c));
       row(kStep).store(reading_.projection == Projection::kl ? clamp_count(a) : a, c);
-      valid = hn::And(valid, is_count(row(kStep).load(c)));
+      valid = pair::And(valid, is_count(row(kStep).load(c)));
       if (batch_.classes[c].tau == nullptr) continue;
-      valid =
-          hn::And(valid, is_usable({row(kTau).load(c), row(kKappa).load(c), row(kBeta).load(c), row(kGamma).load(c)}));
+      valid = pair::And(valid,
+                        is_usable({row(kTau).load(c), row(kKappa).load(c), row(kBeta).load(c), row(kGamma).load(c)}));
     }
     for (size_t c = 0; c < k_; ++c) {
       const MixturePlanes& p = batch_.classes[c];
-      hn::BlendedStore(row(kStep).load(c), valid, F(), p.a + voxel);
-      if (p.responsibility != nullptr) hn::BlendedStore(row(kWeight).load(c), valid, F(), p.responsibility + voxel);
+      pair::BlendedStore(row(kStep).load(c), valid, p.a + voxel);
+      if (p.responsibility != nullptr) pair::BlendedStore(row(kWeight).load(c), valid, p.responsibility + voxel);
       if (p.tau == nullptr) continue;
-      hn::BlendedStore(row(kTau).load(c), valid, F(), p.tau + voxel);
-      hn::BlendedStore(row(kKappa).load(c), valid, F(), p.kappa + voxel);
-      hn::BlendedStore(row(kBeta).load(c), valid, F(), p.beta + voxel);
-      hn::BlendedStore(row(kGamma).load(c), valid, F(), p.gamma + voxel);
+      pair::BlendedStore(row(kTau).load(c), valid, p.tau + voxel);
+      pair::BlendedStore(row(kKappa).load(c), valid, p.kappa + voxel);
+      pair::BlendedStore(row(kBeta).load(c), valid, p.beta + voxel);
+      pair::BlendedStore(row(kGamma).load(c), valid, p.gamma + voxel);
     }
     if (batch_.log_evidence != nullptr) {
-      const V share = log_of(hn::Div(total_weight_, taking_part_));
-      const V log_evidence = hn::Add(hn::Sub(most_, constant(0.5f * std::log(2 * std::numbers::pi_v<float>))), share);
-      hn::BlendedStore(log_evidence, valid, F(), batch_.log_evidence + voxel);
+      const V share = log_of(pair::Div(total_weight_, taking_part_));
+      const V log_evidence =
+          pair::Add(pair::Sub(most_, constant(0.5f * std::log(2 * std::numbers::pi_v<float>))), share);
+      pair::BlendedStore(log_evidence, valid, batch_.log_evidence + voxel);
     }
-    float state[HWY_MAX_BYTES / sizeof(float)];
-    const V noisy = hn::IfThenElseZero(hn::And(usable_, too_noisy_), constant(float(kTooNoisy)));
-    hn::StoreU(hn::IfThenElse(valid, constant(float(kUpdated)), noisy), F(), state);
+    float state[2 * HWY_MAX_BYTES / sizeof(float)];
+    const V noisy = pair::IfThenElseZero(pair::And(usable_, too_noisy_), constant(float(kTooNoisy)));
+    pair::StoreU(pair::IfThenElse(valid, constant(float(kUpdated)), noisy), state);
     for (size_t lane = 0; lane < lanes_; ++lane) batch_.updated[voxel + lane] = uint8_t(state[lane]);
   }
 
@@ -225,10 +228,10 @@ private:
 
 void MixtureKernel(const MixtureBatch& batch, size_t begin, size_t end, const MixtureReading& reading, float* scratch) {
   MixtureTile tile(batch, reading, scratch);
-  for (size_t voxel = begin; voxel < end; voxel += hn::Lanes(F())) tile.update(voxel);
+  for (size_t voxel = begin; voxel < end; voxel += pair::lanes()) tile.update(voxel);
 }
 
-size_t MixtureScratch(size_t classes) { return MixtureTile::kRows * classes * hn::Lanes(F()); }
+size_t MixtureScratch(size_t classes) { return MixtureTile::kRows * classes * pair::lanes(); }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace felt
