@@ -25,6 +25,8 @@ void add_commands(CLI::App& app) {
   app.set_version_flag("--version", [] { return "feltmap " FELTMAP_VERSION " (SIMD: " + simd_name() + ")"; });
   add_simulate(app);
   app.footer("Each command explains itself, with an example: feltmap <command> --help");
+  add_render(app);
+  add_evaluate(app);
 }
 
 int run(int argc, char** argv) {
