@@ -146,7 +146,7 @@ TouchEffect apply_touch(Map& map, Touch touch) {
     effect.after = Beliefs(map).of(recorded.region, covering_touches(map, contact));
     const TouchedLabels after = touched_labels(map, recorded.region);
     for (size_t i = 0; i < after.label.size(); ++i) effect.relabelled += before.label[i] != after.label[i];
-    effect.refused = after.refused - std::min(after.refused, before.refused);
+    effect.refused = after.refused[size_t(&recorded - map.touches.touches.data())];
   } catch (...) {
     std::erase_if(map.touches.touches, [&](const Touch& t) { return t.id == effect.id; });
     throw;

@@ -44,18 +44,16 @@ int16_t vision_label(const Block* block, int offset) {
 }
 
 /// Belief of one voxel of a mixture block.
-Belief belief_of(const MixtureBlock& block, size_t i, const std::vector<std::vector<Nig>>& priors) {
-  const size_t m = size_t(block.voxels), k = block.a.size() / m;
+Belief belief_of(const MixtureState& state, const MixtureBlock& block, size_t i) {
+  const size_t m = block.voxels, k = block.a.size() / m;
   Belief belief;
   double total = 0;
   for (size_t c = 0; c < k; ++c) belief.class_probability.push_back(double(block.a[c * m + i]));
   for (const double a : belief.class_probability) total += a;
   for (double& p : belief.class_probability) p /= total;
-  belief.nig = priors;
-  for (const MixtureBlock::Blocks& state : block.properties)
-    for (size_t c = 0; c < k; ++c)
-      belief.nig[size_t(state.property)][c] = {double(state.tau[c * m + i]), double(state.kappa[c * m + i]),
-                                               double(state.beta[c * m + i]), double(state.gamma[c * m + i])};
+  belief.nig = state.priors;
+  for (const MixtureBlock::Blocks& blocks : block.properties)
+    for (size_t c = 0; c < k; ++c) belief.nig[size_t(blocks.property)][c] = state.nig(block, blocks, c, i);
   for (const std::vector<Nig>& nig : belief.nig) {
     double mass = 0;
     for (size_t c = 0; c < k; ++c) mass += has_prior(nig[c]) ? belief.class_probability[c] : 0;
@@ -96,9 +94,10 @@ TouchedLabels touched_labels(const Map& map, const Region& region) {
       });
     }
   }
-  for (const MixtureBlock& block : mixture_state(map, region)) {
-    out.refused += block.refused;
-    const size_t b = size_t(region.find(block.coord) - region.mask.data()), m = size_t(block.voxels);
+  const MixtureState mixed = mixture_state(map, region);
+  out.refused = mixed.refused;
+  for (const MixtureBlock& block : mixed.blocks) {
+    const size_t b = size_t(region.find(block.coord) - region.mask.data()), m = block.voxels;
     size_t i = 0;
     visit(b, [&](int16_t& at, int offset) {
       if (!block.mask.test(offset)) return;
@@ -143,12 +142,13 @@ std::vector<TouchView> touch_views(const Map& map) {
     for (size_t b = 0; b < group.region.blocks(); ++b)
       for_each_bit(group.region.mask[b], [&](int i) { put(group.region.coord[b], i, cell); });
   }
-  const std::vector<MixtureBlock> mixed = mixture_state(map, touched);
-  tbb::parallel_for(size_t(0), mixed.size(), [&](size_t b) {
+  const MixtureState mixed = mixture_state(map, touched);
+  tbb::parallel_for(size_t(0), mixed.blocks.size(), [&](size_t b) {
+    const MixtureBlock& block = mixed.blocks[b];
     size_t i = 0;
-    for_each_bit(mixed[b].mask, [&](int offset) {
-      const Belief belief = belief_of(mixed[b], i++, beliefs.priors());
-      put(mixed[b].coord, offset, cell_of(belief.class_probability, belief.next_reading));
+    for_each_bit(block.mask, [&](int offset) {
+      const Belief belief = belief_of(mixed, block, i++);
+      put(block.coord, offset, cell_of(belief.class_probability, belief.next_reading));
     });
   });
   return views;

@@ -23,7 +23,7 @@ std::vector<TouchView> touch_views(const Map& map);
 /// Strongest class of every voxel of a region in canonical order, touched or not: -1 without evidence and touches.
 struct TouchedLabels {
   std::vector<int16_t> label;
-  uint64_t refused = 0;  ///< `mixture` readings of these voxels that left their state as it was
+  std::vector<uint64_t> refused;  ///< by touch (place in the journal): voxels whose state it left as it was
 };
 TouchedLabels touched_labels(const Map& map, const Region& region);
 
