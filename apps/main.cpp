@@ -27,6 +27,7 @@ void add_commands(CLI::App& app) {
   add_region(app);
   add_query(app);
   add_suggest(app);
+  add_friction(app);
   add_infer(app);
   add_simulate(app);
   app.footer("Each command explains itself, with an example: feltmap <command> --help");
