@@ -1,6 +1,8 @@
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 

@@ -1,7 +1,10 @@
 #include "io/mask_image.h"
 
+#include <algorithm>
+#include <cstdio>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <string>
 
 #include "core/pose.h"
 

@@ -1,7 +1,9 @@
 #include "io/touch_json.h"
 
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 namespace felt {
 namespace {

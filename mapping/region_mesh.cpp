@@ -1,5 +1,7 @@
 #include "mapping/region_mesh.h"
 
+#include <vector>
+
 #include "mapping/marching_cubes.h"
 
 namespace felt {

@@ -1,6 +1,9 @@
 #include "mapping/region_query.h"
 
 #include <tbb/parallel_for.h>
+#include <array>
+#include <cstdio>
+#include <functional>
 
 #include <algorithm>
 #include <cmath>

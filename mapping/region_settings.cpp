@@ -1,6 +1,7 @@
 #include "mapping/region_settings.h"
 
 #include <cmath>
+#include <cstdio>
 
 namespace felt {
 

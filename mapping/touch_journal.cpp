@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstdio>
 #include <tuple>
+#include <utility>
 
 namespace felt {
 namespace {
@@ -50,6 +52,13 @@ private:
   XXH3_state_t state_;
 };
 
+void put_in_order(TouchJournal& journal, Touch touch) {
+  const auto key = [](const Touch& t) { return std::tuple(t.request.stamp_s, t.id); };
+  const auto at = std::lower_bound(journal.touches.begin(), journal.touches.end(), key(touch),
+                                   [&](const Touch& t, const auto& k) { return key(t) < k; });
+  journal.touches.insert(at, std::move(touch));
+}
+
 }  // namespace
 
 const char* model_name(TouchModel model) { return model == TouchModel::material ? "material" : "mixture"; }
@@ -84,12 +93,23 @@ uint64_t insert(TouchJournal& journal, Touch touch) {
   digest << touch.request;
   touch.id = digest.value().low64;
   while (journal.find(touch.id) != nullptr) ++touch.id;
-  const auto key = [](const Touch& t) { return std::tuple(t.request.stamp_s, t.id); };
   const uint64_t id = touch.id;
-  const auto at = std::lower_bound(journal.touches.begin(), journal.touches.end(), key(touch),
-                                   [&](const Touch& t, const auto& k) { return key(t) < k; });
-  journal.touches.insert(at, std::move(touch));
+  put_in_order(journal, std::move(touch));
   return id;
+}
+
+TouchJournal joined(const TouchJournal& a, const TouchJournal& b) {
+  TouchJournal all = a;
+  for (const Touch& touch : b.touches) {
+    Touch* known = all.find(touch.id);
+    if (known == nullptr) {
+      put_in_order(all, touch);
+      continue;
+    }
+    known->region = united(known->region, touch.region);
+    known->undone = known->undone && touch.undone;
+  }
+  return all;
 }
 
 std::string id_text(uint64_t id) {

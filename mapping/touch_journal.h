@@ -68,6 +68,10 @@ struct TouchJournal {
 /// a request that came before gets the next free number. Returns the id.
 uint64_t insert(TouchJournal& journal, Touch touch);
 
+/// The touches of both journals, whichever comes first: a touch that both hold once, with both regions, and undone only
+/// where both say so.
+TouchJournal joined(const TouchJournal& a, const TouchJournal& b);
+
 /// 16 hexadecimal digits, and back (throws TouchError).
 std::string id_text(uint64_t id);
 uint64_t id_of_text(const std::string& text);

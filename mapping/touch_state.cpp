@@ -1,6 +1,8 @@
 #include "mapping/touch_state.h"
 
 #include <tbb/parallel_for.h>
+#include <limits>
+#include <utility>
 
 #include <algorithm>
 #include <cmath>

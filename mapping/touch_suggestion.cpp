@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <unordered_map>
+#include <utility>
 
 #include "inference/class_posterior.h"
 #include "inference/information_gain.h"

@@ -1,6 +1,10 @@
 #include "mapping/touch_update.h"
 
 #include <tbb/parallel_for.h>
+#include <cstdio>
+#include <limits>
+#include <string>
+#include <utility>
 
 #include <algorithm>
 #include <cmath>
@@ -143,10 +147,15 @@ TouchEffect apply_touch(Map& map, Touch touch) {
   effect.id = insert(map.touches, std::move(touch));
   Touch& recorded = *map.touches.find(effect.id);
   try {
-    effect.after = Beliefs(map).of(recorded.region, covering_touches(map, contact));
+    std::vector<uint32_t> touches = covering_touches(map, contact);
+    // Class noise can keep the contact's own voxel out of the region that grows around it.
+    const auto own = uint32_t(&recorded - map.touches.touches.data());
+    if (const auto at = std::lower_bound(touches.begin(), touches.end(), own); at == touches.end() || *at != own)
+      touches.insert(at, own);
+    effect.after = Beliefs(map).of(recorded.region, touches);
     const TouchedLabels after = touched_labels(map, recorded.region);
     for (size_t i = 0; i < after.label.size(); ++i) effect.relabelled += before.label[i] != after.label[i];
-    effect.refused = after.refused[size_t(&recorded - map.touches.touches.data())];
+    effect.refused = after.refused[own];
   } catch (...) {
     std::erase_if(map.touches.touches, [&](const Touch& t) { return t.id == effect.id; });
     throw;

@@ -2,6 +2,9 @@
 // has counts of its own, so that the mixture model has as many states as voxels.
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
+#include <cstdint>
+#include <string>
+#include <vector>
 
 #include <cmath>
 #include <random>

@@ -1,9 +1,13 @@
 #include "io/friction_log.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "core/error.h"
 

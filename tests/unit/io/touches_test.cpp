@@ -1,6 +1,8 @@
 #include "io/touches.h"
 
 #include <catch2/catch.hpp>
+#include <optional>
+#include <string>
 
 #include "io/map_file.h"
 #include "io/property_yaml.h"

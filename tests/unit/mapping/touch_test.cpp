@@ -1,6 +1,10 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <random>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "inference/mixture.h"
 #include "mapping/touch_mixture.h"
@@ -278,4 +282,19 @@ TEST_CASE("a reading that cannot be true is refused with the reason and leaves t
   refused(request, "mask image");
   map.classes = class_table({"carpet", "tiles"});
   refused(reading(0.1, 0, 0.3), "with a prior");
+}
+
+TEST_CASE("joining two journals gives every touch once, whichever comes first") {
+  Map map = two_floors(snow, wood, 4);
+  TouchJournal left, right;
+  const Touch shared = resolve_touch(map, reading(-0.2, 0, 0.3, 2));
+  insert(left, resolve_touch(map, reading(-0.2, 0, 0.2, 3)));
+  insert(left, shared);
+  insert(right, resolve_touch(map, reading(0.2, 0, 0.4, 1)));
+  insert(right, shared);
+  const TouchJournal both = joined(left, right);
+  REQUIRE(both.touches.size() == 3);
+  CHECK(both.touches[0].request.stamp_s == 1);
+  CHECK(both.touches[2].request.stamp_s == 3);
+  CHECK(journal_digest(both) == journal_digest(joined(right, left)));
 }
