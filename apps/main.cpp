@@ -23,6 +23,12 @@ int fail(ExitCode code, const std::string& message) {
 void add_commands(CLI::App& app) {
   app.require_subcommand(1);
   app.set_version_flag("--version", [] { return "feltmap " FELTMAP_VERSION " (SIMD: " + simd_name() + ")"; });
+  add_touch(app);
+  add_region(app);
+  add_query(app);
+  add_suggest(app);
+  add_friction(app);
+  add_infer(app);
   add_simulate(app);
   add_infer(app);
   app.footer("Each command explains itself, with an example: feltmap <command> --help");

@@ -13,7 +13,9 @@
 #include "io/map_metadata.h"
 #include "io/map_trailer.h"
 #include "io/vdb_writer.h"
+#include "mapping/touch_update.h"
 #include "mapping/vdb_state.h"
+#include "mapping/vdb_touch.h"
 #include "mapping/vdb_views.h"
 
 namespace felt {
@@ -50,6 +52,8 @@ bool has_color(const Map& map) {
   return false;
 }
 
+std::string region_name(const Touch& touch) { return "touch_region/" + id_text(touch.id); }
+
 /// One call for each grid of the file: made when it is written and gone afterwards, so that the file's size does not
 /// decide about memory.
 std::vector<std::function<openvdb::GridBase::Ptr()>> grids_of(const Map& map) {
@@ -61,6 +65,10 @@ std::vector<std::function<openvdb::GridBase::Ptr()>> grids_of(const Map& map) {
     grids.push_back([&] { return color_count_grid(map); });
   }
   for (const int slot : observed_classes(map)) grids.push_back([&map, slot] { return evidence_grid(map, slot); });
+  for (const Touch& touch : map.touches.touches)
+    grids.push_back([&map, &touch] { return region_grid(map, touch.region, region_name(touch)); });
+  // Views of the touched voxels are small: they are made once.
+  for (const openvdb::GridBase::Ptr& grid : touch_grids(map)) grids.push_back([grid] { return grid; });
   return grids;
 }
 
@@ -92,6 +100,15 @@ Map read_map(const fs::path& path) {
   for (int slot = 0; slot < map.classes.size(); ++slot)
     if (const std::string name = "evidence/" + map.classes.at_slot(slot).name; file.hasGrid(name))
       add_evidence(map, slot, *read_grid<openvdb::FloatGrid>(file, name, where));
+  map.properties = header.properties;
+  map.touches = header.touches;
+  for (Touch& touch : map.touches.touches) {
+    if (!map.properties.index_of(touch.request.property))
+      throw FormatError(describe_mismatch(where, "touch " + id_text(touch.id), "a property of the map's table",
+                                          "'" + touch.request.property + "'"));
+    touch.region = region_of(*read_grid<openvdb::MaskGrid>(file, region_name(touch), where));
+  }
+  rebuild_touch_planes(map);
   if (const std::string hash = map_hash(map); hash != header.hash)
     throw FormatError(describe_mismatch(where, "map hash", header.hash, hash));
   return map;

@@ -7,6 +7,8 @@
 
 #include "core/error.h"
 #include "io/map_file.h"
+#include "io/property_yaml.h"
+#include "io/touch_json.h"
 
 namespace felt {
 namespace {
@@ -19,6 +21,8 @@ constexpr const char* kTruncation = "truncation_m";
 constexpr const char* kHash = "map_hash";
 constexpr const char* kClasses = "class_table";
 constexpr const char* kFrames = "frame_journal";
+constexpr const char* kProperties = "property_table";
+constexpr const char* kTouches = "touch_journal";
 constexpr const char* kCentre = "voxel_centre";
 constexpr const char* kCentreRule = "index (i, j, k) is the voxel's centre, at (i, j, k) * voxel_size_m";
 const std::string kTextPrefix = "text/";
@@ -127,6 +131,10 @@ openvdb::MetaMap to_metadata(const Map& map, const std::string& hash) {
   try {
     metadata.insertMeta(kClasses, openvdb::StringMetadata(classes_to_json(map.classes).dump()));
     metadata.insertMeta(kFrames, openvdb::StringMetadata(journal_to_json(map.frames).dump()));
+    if (!map.properties.empty())
+      metadata.insertMeta(kProperties, openvdb::StringMetadata(properties_yaml(map.properties)));
+    if (!map.touches.touches.empty())
+      metadata.insertMeta(kTouches, openvdb::StringMetadata(touch_journal_json(map.touches)));
   } catch (const json::exception& error) {
     throw FormatError(describe_mismatch("map", "names in the class table and frame journal", "UTF-8", error.what()));
   }
@@ -144,6 +152,10 @@ MapHeader read_metadata(const openvdb::MetaMap& metadata, const std::string& whe
   header.hash = value<std::string>(metadata, kHash, where);
   header.classes = parsed(metadata, kClasses, where, classes_from_json);
   header.frames = parsed(metadata, kFrames, where, journal_from_json);
+  if (metadata[kProperties] != nullptr)
+    header.properties = parse_properties(value<std::string>(metadata, kProperties, where), where + ": property_table");
+  if (metadata[kTouches] != nullptr)
+    header.touches = parse_touch_journal(value<std::string>(metadata, kTouches, where), where);
   for (auto entry = metadata.beginMeta(); entry != metadata.endMeta(); ++entry)
     if (entry->first.starts_with(kTextPrefix))
       header.metadata[entry->first.substr(kTextPrefix.size())] =

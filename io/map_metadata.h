@@ -14,7 +14,9 @@ struct MapHeader {
   double truncation_m = 0;
   std::string hash;  ///< `map_hash` of what was saved
   ClassTable classes;
+  PropertyTable properties;
   FrameJournal frames;
+  TouchJournal touches;  ///< without region masks
   std::map<std::string, std::string> metadata;
 };
 

@@ -1,6 +1,8 @@
 #include "io/property_yaml.h"
 
 #include <yaml-cpp/yaml.h>
+#include <utility>
+#include <vector>
 
 #include <cmath>
 #include <fstream>

@@ -35,12 +35,22 @@ struct EvidencePlane {
   Plane* counts = nullptr;
 };
 
+/// Readings of one property that cover the voxels of a block: how many, their mean, and their squared deviations from
+/// it.
+struct TouchPlanes {
+  uint16_t property = 0;  ///< PropertyTable index
+  Plane* n = nullptr;
+  Plane* mean = nullptr;
+  Plane* m2 = nullptr;
+};
+
 /// One 8^3 block. Planes are owned by the BlockStore; a null plane holds its background everywhere.
 struct Block {
   BlockCoord coord;
   GeometryPlanes* geometry = nullptr;  ///< never null
   ColorPlanes* color = nullptr;
   std::vector<EvidencePlane> evidence;  ///< ascending slot; only classes seen in this block
+  std::vector<TouchPlanes> touch;       ///< ascending property; only properties touched in this block
 };
 
 /// Owner of every plane of a map, indexed by block coordinates. Blocks keep their number (order of creation) and their

@@ -35,6 +35,10 @@ std::string map_hash(const Map& map) {
       XXH3_128bits_update(&state, &e.slot, sizeof e.slot);
       XXH3_128bits_update(&state, e.counts, sizeof *e.counts);
     }
+    for (const TouchPlanes& t : block.touch) {
+      XXH3_128bits_update(&state, &t.property, sizeof t.property);
+      for (const Plane* plane : {t.n, t.mean, t.m2}) XXH3_128bits_update(&state, plane, sizeof *plane);
+    }
     digests[n] = XXH3_128bits_digest(&state);
   });
   XXH3_state_t all;
@@ -44,6 +48,8 @@ std::string map_hash(const Map& map) {
   XXH3_128bits_update(&all, &map.truncation_m, sizeof map.truncation_m);
   for (size_t n = 0; n < order.size(); ++n)
     if (holds[n]) XXH3_128bits_update(&all, &digests[n], sizeof digests[n]);
+  const std::string touches = journal_digest(map.touches);
+  XXH3_128bits_update(&all, touches.data(), touches.size());
   const XXH128_hash_t h = XXH3_128bits_digest(&all);
   char hex[33];
   snprintf(hex, sizeof hex, "%016llx%016llx", static_cast<unsigned long long>(h.high64),

@@ -5,8 +5,10 @@
 #include <string>
 
 #include "core/class_table.h"
+#include "core/property_table.h"
 #include "mapping/block_store.h"
 #include "mapping/frame_journal.h"
+#include "mapping/touch_journal.h"
 
 namespace felt {
 
@@ -19,7 +21,9 @@ struct Map {
   double truncation_m;
   BlockStore store;
   ClassTable classes;  ///< empty: a map without semantics
+  PropertyTable properties;  ///< what touches can measure
   FrameJournal frames;
+  TouchJournal touches;
   /// Text that travels with the map, by key: the configuration as used, where it came from. Not part of `map_hash`.
   std::map<std::string, std::string> metadata;
 };

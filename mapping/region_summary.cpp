@@ -1,4 +1,8 @@
 #include <tbb/parallel_for.h>
+#include <cstdio>
+#include <limits>
+#include <string>
+#include <vector>
 
 #include <algorithm>
 #include <array>

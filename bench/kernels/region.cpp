@@ -2,6 +2,7 @@
 #include <benchmark/benchmark.h>
 #include <openvdb/tools/LevelSetUtil.h>
 #include <tbb/global_control.h>
+#include <vector>
 
 #include <cmath>
 #include <random>

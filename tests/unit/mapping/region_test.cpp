@@ -1,6 +1,8 @@
 #include "mapping/region.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <random>
 #include <set>
 

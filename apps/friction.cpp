@@ -1,0 +1,76 @@
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "apps/command.h"
+#include "apps/commands.h"
+#include "apps/exit_code.h"
+#include "apps/touch_options.h"
+#include "io/friction_log.h"
+#include "io/map_file.h"
+
+namespace felt::apps {
+namespace {
+
+using json = nlohmann::ordered_json;
+
+struct FrictionOptions : CommonOptions {
+  std::string log, normal, map, at, plot;
+  FrictionSettings settings;
+};
+
+int run_friction(const FrictionOptions& options) {
+  FrictionSettings settings = options.settings;
+  if (!options.normal.empty()) settings.normal = point_of(options.normal);
+  if (!options.map.empty())
+    settings.normal = find_contact(load_map(options.map), point_of(options.at), RegionSettings{}).normal;
+  const ForceLog log = read_force_log(options.log);
+  const FrictionReading reading = friction_reading(log, settings);
+  if (!options.plot.empty()) write_plot_svg(options.plot, friction_plots(log, reading));
+  const double stamp_s = log.time_s[reading.slide_begin];
+  char touch[256];
+  snprintf(touch, sizeof touch, "%.6f,%s,friction,%.4f,%.4f", stamp_s,
+           options.at.empty() ? "x,y,z" : options.at.c_str(), reading.kinetic_mean, reading.kinetic_sd);
+  if (options.json) {
+    const auto time = [&](size_t i) { return log.time_s[std::min(i, log.time_s.size() - 1)]; };
+    const json out{{"kinetic", {{"mean", reading.kinetic_mean}, {"sd", reading.kinetic_sd}}},
+                   {"static", {{"peak", reading.static_peak}, {"time_s", time(reading.peak)}}},
+                   {"contact_s", {time(reading.contact_begin), time(reading.contact_end)}},
+                   {"sliding_s", {time(reading.slide_begin), time(reading.slide_end)}},
+                   {"normal", point_json(settings.normal)},
+                   {"touch", touch}};
+    std::printf("%s\n", out.dump(2).c_str());
+    return kDone;
+  }
+  std::printf("kinetic %.4f +- %.4f, static peak %.4f\n", reading.kinetic_mean, reading.kinetic_sd,
+              reading.static_peak);
+  std::printf("stamp,x,y,z,property,value,sigma\n%s\n", touch);
+  return kDone;
+}
+
+}  // namespace
+
+void add_friction(CLI::App& app) {
+  auto options = std::make_shared<FrictionOptions>();
+  CLI::App& command = add_command(app,
+                                  {"friction", "Coefficient of friction from a force-torque log",
+                                   "feltmap friction log.csv --normal 0,0,1 --plot log.svg\n"
+                                   "feltmap friction log.csv --map map.vdb --at 0.4,1.2,0.0"},
+                                  *options, [options] { return run_friction(*options); });
+  command.add_option("log", options->log, "CSV with columns t, fx, fy, fz (seconds, newtons)")->required();
+  CLI::Option* normal =
+      command.add_option("--normal", options->normal, "Surface normal in the frame of the forces: x,y,z")
+          ->check(check_point);
+  CLI::Option* at =
+      command.add_option("--at", options->at, "Contact point, metres: x,y,z (for the touch)")->check(check_point);
+  command.add_option("--map", options->map, "Take the normal from this map (forces in the world frame)")
+      ->needs(at)
+      ->excludes(normal);
+  command.add_option("--cutoff", options->settings.cutoff_hz, "Low-pass cut-off, Hz")->capture_default_str();
+  command.add_option("--contact-force", options->settings.contact_n, "Normal force of a contact, N")
+      ->capture_default_str();
+  command.add_option("--plot", options->plot, "Write a picture of the log and what was found in it (SVG)");
+}
+
+}  // namespace felt::apps

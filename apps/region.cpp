@@ -1,0 +1,74 @@
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "apps/command.h"
+#include "apps/commands.h"
+#include "apps/exit_code.h"
+#include "apps/touch_options.h"
+#include "io/map_file.h"
+#include "io/mesh_io.h"
+#include "mapping/region_mesh.h"
+
+namespace felt::apps {
+namespace {
+
+using json = nlohmann::ordered_json;
+
+struct RegionCommandOptions : CommonOptions {
+  std::string map, at, mesh, properties;
+  std::optional<double> below;
+  RegionOptions region;
+};
+
+int run_region(const RegionCommandOptions& options) {
+  const RegionSettings settings = options.region.resolved();
+  Map map = load_map(options.map);
+  use_properties(map, options.properties);
+  const Contact contact = find_contact(map, point_of(options.at), settings);
+  const std::optional<ViewMask> view = options.region.view();
+  const Region region = view ? find_region(map, *view, settings, &contact) : find_region(map, contact, settings);
+  const RegionSummary summary = summarize(map, region, settings);
+  const Belief belief = Beliefs(map).of(region, covering_touches(map, contact.voxel));
+  if (!options.mesh.empty()) write_mesh(options.mesh, region_mesh(map, region));
+  if (options.json) {
+    json out = summary_json(map, summary);
+    out["contact"] = {{"point_m", point_json(contact.point_m)},
+                      {"surface_m", point_json(contact.surface_m)},
+                      {"distance_m", contact.distance_m},
+                      {"normal", point_json(contact.normal)}};
+    out["rule"] = rule_name(settings.rule);
+    out["belief"] = belief_json(map, belief, options.below);
+    std::printf("%s\n", out.dump(2).c_str());
+    return kDone;
+  }
+  std::printf("%zu voxels in %zu blocks, %.3f m2, from (%.3f, %.3f, %.3f) to (%.3f, %.3f, %.3f) m\n", summary.voxels,
+              summary.blocks, summary.area_m2, summary.min_m.x(), summary.min_m.y(), summary.min_m.z(),
+              summary.max_m.x(), summary.max_m.y(), summary.max_m.z());
+  for (int c = 0; c < map.classes.size(); ++c)
+    if (summary.class_voxels[size_t(c)] > 0)
+      std::printf("  %s: %zu voxels\n", map.classes.at_slot(c).name.c_str(), summary.class_voxels[size_t(c)]);
+  std::printf("  believed: %s\n", belief_text(map, belief).c_str());
+  for (const std::string& warning : summary.warnings) std::printf("  warning: %s\n", warning.c_str());
+  return kDone;
+}
+
+}  // namespace
+
+void add_region(CLI::App& app) {
+  auto options = std::make_shared<RegionCommandOptions>();
+  CLI::App& command = add_command(app,
+                                  {"region", "Show the region that a touch at a point would update",
+                                   "feltmap region map.vdb --at 0.4,1.2,0.0 --mesh floor.ply\nfeltmap region map.vdb "
+                                   "--at 0.4,1.2,0.0 --below 0.25"},
+                                  *options, [options] { return run_region(*options); });
+  command.add_option("map", options->map, "Map file")->required();
+  command.add_option("--at", options->at, "World point, metres: x,y,z")->check(check_point)->required();
+  command.add_option("--mesh", options->mesh, "Write the region's surface (.ply, .obj, .glb)");
+  command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
+  command.add_option("--below", options->below, "Probability that a property is at most this");
+  options->region.add_to(command);
+}
+
+}  // namespace felt::apps

@@ -1,0 +1,166 @@
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/command.h"
+#include "apps/commands.h"
+#include "apps/exit_code.h"
+#include "apps/touch_options.h"
+#include "io/map_file.h"
+#include "io/touches.h"
+
+namespace felt::apps {
+namespace {
+
+using json = nlohmann::ordered_json;
+
+struct TouchOptions : CommonOptions {
+  std::string map, at, property, file, out, undo, redo, properties, model = "material", projection = "kl";
+  double value = 0, sigma = 0, rho = std::numeric_limits<double>::quiet_NaN(), stamp_s = 0;
+  bool dry_run = false;
+  RegionOptions region;
+};
+
+json effect_json(const Map& map, const TouchEffect& effect, const RegionSettings& settings) {
+  const Touch& touch = *map.touches.find(effect.id);
+  const TouchRequest& r = touch.request;
+  json out;
+  out["id"] = id_text(effect.id);
+  out["property"] = r.property;
+  out["value"] = r.value;
+  out["sigma"] = r.sigma;
+  out["stamp"] = r.stamp_s;
+  out["model"] = model_name(r.model);
+  out["projection"] = projection_name(r.projection);
+  out["contact"] = {{"point_m", point_json(r.point_m)},
+                    {"surface_m", point_json(touch.surface_m)},
+                    {"distance_m", (touch.surface_m - r.point_m).norm()}};
+  out["region"] = summary_json(map, summarize(map, touch.region, settings));
+  out["before"] = belief_json(map, effect.before, std::nullopt);
+  out["after"] = belief_json(map, effect.after, std::nullopt);
+  out["relabelled_voxels"] = effect.relabelled;
+  out["refused_voxels"] = effect.refused;
+  out["tail_probability"] = effect.tail_probability;
+  out["flags"] = {{"surprising", effect.flags.surprising},
+                  {"multi_modal_before", effect.flags.multi_modal},
+                  {"multi_modal_after", effect.modes.size() > 1},
+                  {"not_one_material", effect.flags.not_one_material}};
+  return out;
+}
+
+void print_effect(const Map& map, const TouchEffect& effect, const RegionSettings& settings) {
+  const Touch& touch = *map.touches.find(effect.id);
+  const RegionSummary region = summarize(map, touch.region, settings);
+  std::printf("touch %s: %s %g on %zu voxels, %.3f m2\n", id_text(effect.id).c_str(), touch.request.property.c_str(),
+              touch.request.value, region.voxels, region.area_m2);
+  std::printf("  before: %s\n  after:  %s\n  %llu voxels changed their class\n",
+              belief_text(map, effect.before).c_str(), belief_text(map, effect.after).c_str(),
+              static_cast<unsigned long long>(effect.relabelled));
+  if (effect.refused > 0)
+    std::printf("  %llu voxels kept their state: no valid projection\n",
+                static_cast<unsigned long long>(effect.refused));
+  for (const std::string& warning : region.warnings) std::printf("  warning: %s\n", warning.c_str());
+  if (effect.flags.surprising) std::printf("  warning: no class explains this reading\n");
+  if (effect.flags.not_one_material) std::printf("  warning: the region may hold more than one material\n");
+  if (effect.modes.size() > 1) {
+    std::printf("  warning: the property may be any of");
+    for (const double mode : effect.modes) std::printf(" %.3g", mode);
+    std::printf("\n");
+  }
+}
+
+TouchRequest request_of(const TouchOptions& options) {
+  TouchRequest request;
+  request.stamp_s = options.stamp_s;
+  if (!options.at.empty()) request.point_m = point_of(options.at);
+  request.property = options.property;
+  request.value = options.value;
+  request.sigma = options.sigma;
+  request.model = model_of_name(options.model);
+  request.projection = projection_of_name(options.projection);
+  request.rho = options.rho;
+  request.region = options.region.resolved();
+  return request;
+}
+
+int run_touch(const TouchOptions& options) {
+  const TouchRequest request = request_of(options);
+  Map map = load_map(options.map);
+  use_properties(map, options.properties);
+  json out;
+  out["map"] = options.map;
+  out["dry_run"] = options.dry_run;
+  int code = kDone;
+  if (!options.undo.empty() || !options.redo.empty()) {
+    const bool undo = !options.undo.empty();
+    const uint64_t id = id_of_text(undo ? options.undo : options.redo);
+    undo ? undo_touch(map, id) : redo_touch(map, id);
+    out[undo ? "undone" : "redone"] = id_text(id);
+    if (!options.json) std::printf("touch %s: %s\n", id_text(id).c_str(), undo ? "undone" : "redone");
+  } else if (!options.file.empty()) {
+    out["touches"] = json::array();
+    for (const TouchOutcome& outcome :
+         apply_recorded_touches(map, read_touches(options.file), request, /*sequence=*/nullptr)) {
+      const std::string where = options.file + ":" + std::to_string(outcome.touch.line);
+      if (outcome.effect) {
+        out["touches"].push_back(effect_json(map, *outcome.effect, request.region));
+        if (!options.json) print_effect(map, *outcome.effect, request.region);
+      } else {
+        code = kInputOutput;
+        out["touches"].push_back({{"line", outcome.touch.line}, {"error", outcome.refused}});
+        std::fprintf(stderr, "feltmap: error: %s: %s\n", where.c_str(), outcome.refused.c_str());
+      }
+    }
+  } else {
+    const std::optional<ViewMask> view = options.region.view();
+    const TouchEffect effect = apply_touch(map, resolve_touch(map, request, view ? &*view : nullptr));
+    out.update(effect_json(map, effect, request.region));
+    if (!options.json) print_effect(map, effect, request.region);
+  }
+  out["map_hash"] = map_hash(map);
+  if (code == kDone && !options.dry_run) save_map(map, options.out.empty() ? options.map : options.out);
+  if (options.json) std::printf("%s\n", out.dump(2).c_str());
+  return code;
+}
+
+}  // namespace
+
+void add_touch(CLI::App& app) {
+  auto options = std::make_shared<TouchOptions>();
+  CLI::App& command =
+      add_command(app,
+                  {"touch", "Record a reading of a property at a point and update the surface it speaks for",
+                   "feltmap touch map.vdb --at 0.4,1.2,0.0 --property friction --value 0.139\n"
+                   "feltmap touch map.vdb --file touches.csv --out touched.vdb\n"
+                   "feltmap touch map.vdb --undo 3f0c5d8a91e2b764"},
+                  *options, [options] { return run_touch(*options); });
+  command.add_option("map", options->map, "Map file")->required();
+  CLI::Option_group& what = *command.add_option_group("What to do");
+  what.require_option(1);
+  CLI::Option* at = what.add_option("--at", options->at, "World point of a reading, metres: x,y,z")->check(check_point);
+  what.add_option("--file", options->file, "Recorded touches (CSV): all of them, or none");
+  what.add_option("--undo", options->undo, "Take back the touch with this id");
+  what.add_option("--redo", options->redo, "Let an undone touch count again");
+  CLI::Option* property = command.add_option("--property", options->property, "What was measured");
+  CLI::Option* value = command.add_option("--value", options->value, "The reading, in the property's unit");
+  at->needs(property)->needs(value);
+  command.add_option("--sigma", options->sigma, "Standard deviation of the reading's noise")->capture_default_str();
+  command.add_option("--stamp", options->stamp_s, "Time of the touch, seconds")->capture_default_str();
+  command.add_option("--model", options->model, "material: the region is one material; mixture: each voxel its own")
+      ->check(CLI::IsMember({"material", "mixture"}))
+      ->capture_default_str();
+  command.add_option("--projection", options->projection, "kl or published")
+      ->check(CLI::IsMember({"kl", "published"}))
+      ->capture_default_str();
+  command.add_option("--rho", options->rho, "Correlation of readings within a region, instead of the property's");
+  command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
+  command.add_option("--out", options->out, "Write here instead of in place");
+  command.add_flag("--dry-run", options->dry_run, "Say what would change and write nothing");
+  options->region.add_to(command);
+}
+
+}  // namespace felt::apps

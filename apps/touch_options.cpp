@@ -1,0 +1,188 @@
+#include "apps/touch_options.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include "core/error.h"
+#include "inference/decision.h"
+#include "io/mask_image.h"
+#include "io/property_yaml.h"
+
+namespace felt::apps {
+namespace {
+
+using json = nlohmann::ordered_json;
+
+std::optional<std::vector<double>> numbers_of(const std::string& text) {
+  std::vector<double> numbers;
+  std::istringstream cells(text);
+  for (std::string cell; std::getline(cells, cell, ',');) {
+    try {
+      size_t used = 0;
+      numbers.push_back(std::stod(cell, &used));
+      if (used != cell.size()) return std::nullopt;
+    } catch (const std::exception&) {
+      return std::nullopt;
+    }
+  }
+  return numbers;
+}
+
+/// Threshold of the gait decision of Ewen et al. 2024: below it the legged robot walks statically.
+constexpr double kGaitFriction = 0.25;
+
+json property_json(const StudentTMixture& next, const Property& property, double readings,
+                   std::optional<double> below) {
+  json out;
+  out["unit"] = property.unit;
+  out["touches"] = readings;
+  if (next.weight.empty()) {
+    out["mean"] = nullptr;
+    out["reason"] = "no class with a prior";
+    return out;
+  }
+  const auto value = [](const std::optional<double>& x) { return x ? json(*x) : json(nullptr); };
+  const std::optional<double> m = mean(next), v = variance(next);
+  out["mean"] = value(m);
+  out["sd"] = v ? json(std::sqrt(*v)) : json(nullptr);
+  out["location"] = location(next);
+  if (!m)
+    out["reason"] = "a class has at most one degree of freedom: no mean, sd or CVaR";
+  else if (!v)
+    out["reason"] = "a class has at most two degrees of freedom: no sd";
+  for (const auto& [key, p] : {std::pair("0.05", 0.05), {"0.25", 0.25}, {"0.5", 0.5}, {"0.75", 0.75}, {"0.95", 0.95}})
+    out["quantiles"][key] = value(quantile(next, p));
+  out["cvar"] = {{"lower_0.05", value(cvar(next, 0.05, Tail::lower))},
+                 {"upper_0.95", value(cvar(next, 0.95, Tail::upper))}};
+  out["modes"] = modes(next);
+  if (below) out["below"] = {{"threshold", *below}, {"probability", cdf(next, *below)}};
+  if (property.name == "friction" && m)
+    out["gait"] = {{"threshold", kGaitFriction}, {"decision", *m <= kGaitFriction ? "static" : "dynamic"}};
+  return out;
+}
+
+}  // namespace
+
+std::string check_point(const std::string& text) {
+  const auto numbers = numbers_of(text);
+  if (numbers && numbers->size() == 3) return "";
+  return "expected x,y,z in metres, found '" + text + "'";
+}
+
+Eigen::Vector3d point_of(const std::string& text) {
+  const auto numbers = numbers_of(text);
+  return {numbers->at(0), numbers->at(1), numbers->at(2)};
+}
+
+void RegionOptions::add_to(CLI::App& command) {
+  command.add_option("--region", rule, "connected, mask or sphere")
+      ->check(CLI::IsMember({"connected", "mask", "sphere"}))
+      ->capture_default_str();
+  command.add_option("--radius", settings.radius_m, "Limit in metres: along the surface, or of the sphere");
+  command.add_option("--snap", settings.snap_voxels, "How far the surface may be from the point, voxels")
+      ->capture_default_str();
+  command.add_option("--band", settings.band_voxels, "Half width of the surface band, voxels")->capture_default_str();
+  command.add_option("--min-weight", settings.min_weight, "Observation weight of an observed voxel")
+      ->capture_default_str();
+  command
+      .add_option("--class-ratio", settings.class_ratio,
+                  "Least belief in the contact's class against the voxel's strongest, 0 to 1")
+      ->capture_default_str();
+  command.add_option("--normal-change", settings.normal_change_deg, "Largest angle between neighbours, degrees")
+      ->capture_default_str();
+  command.add_option("--color-change", settings.color_change,
+                     "Largest difference from the contact's colour, grey levels");
+  command.add_option("--mask", mask, "Image whose non-zero pixels belong to the region (with --region mask)");
+  command.add_option("--intrinsics", intrinsics, "Camera of the mask: fx,fy,cx,cy")->delimiter(',')->expected(4);
+  command.add_option("--pose", pose, "Camera to world of the mask: 16 numbers row by row")
+      ->delimiter(',')
+      ->expected(16);
+}
+
+RegionSettings RegionOptions::resolved() const {
+  RegionSettings out = settings;
+  out.rule = rule_of_name(rule);
+  validate(out);
+  return out;
+}
+
+std::optional<ViewMask> RegionOptions::view() const {
+  if (rule != "mask") return std::nullopt;
+  if (mask.empty() || intrinsics.size() != 4 || pose.size() != 16)
+    throw TouchError("region mask: expected --mask, --intrinsics and --pose, found not all of them");
+  return read_view_mask(mask, intrinsics, pose);
+}
+
+json number_or_null(double x) { return std::isfinite(x) ? json(x) : json(nullptr); }
+
+json point_json(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z()}; }
+
+json belief_json(const Map& map, const Belief& belief, std::optional<double> below) {
+  json out;
+  if (map.classes.size() > 0) {
+    out["class"] = map.classes.at_slot(most_probable_class(belief.class_probability)).name;
+    for (int c = 0; c < map.classes.size(); ++c)
+      out["class_probability"][map.classes.at_slot(c).name] = belief.class_probability[size_t(c)];
+    out["class_entropy"] = class_entropy(belief.class_probability);
+  }
+  out["properties"] = json::object();
+  for (int p = 0; p < map.properties.size(); ++p)
+    out["properties"][map.properties[p].name] =
+        property_json(belief.next_reading[size_t(p)], map.properties[p], belief.readings[size_t(p)], below);
+  return out;
+}
+
+json summary_json(const Map& map, const RegionSummary& summary) {
+  json out;
+  out["voxels"] = summary.voxels;
+  out["blocks"] = summary.blocks;
+  out["area_m2"] = summary.area_m2;
+  out["extent_m"] = {{"min", point_json(summary.min_m)}, {"max", point_json(summary.max_m)}};
+  out["class_voxels"] = json::object();
+  for (int c = 0; c < map.classes.size(); ++c)
+    if (summary.class_voxels[size_t(c)] > 0)
+      out["class_voxels"][map.classes.at_slot(c).name] = summary.class_voxels[size_t(c)];
+  out["unlabelled_voxels"] = summary.unlabelled_voxels;
+  out["leaks"] = {{"necks", summary.necks},
+                  {"mixed_fraction", summary.mixed_fraction},
+                  {"boundary_voxels", summary.boundary_voxels},
+                  {"open_boundary_fraction", summary.open_boundary_fraction}};
+  out["warnings"] = summary.warnings;
+  return out;
+}
+
+std::string belief_text(const Map& map, const Belief& belief) {
+  std::ostringstream out;
+  out.precision(3);
+  if (map.classes.size() > 0) {
+    const int best = most_probable_class(belief.class_probability);
+    out << map.classes.at_slot(best).name << " " << belief.class_probability[size_t(best)];
+  }
+  for (int p = 0; p < map.properties.size(); ++p) {
+    const StudentTMixture& next = belief.next_reading[size_t(p)];
+    out << ", " << map.properties[p].name << " ";
+    const std::optional<double> m = next.weight.empty() ? std::nullopt : mean(next);
+    if (!m) {
+      out << "unknown";
+      continue;
+    }
+    out << *m;
+    if (const auto v = variance(next)) out << " +- " << std::sqrt(*v);
+  }
+  return out.str();
+}
+
+void use_properties(Map& map, const std::string& file) {
+  if (file.empty()) return;
+  const PropertyTable table = read_properties(file);
+  // The index of a property is its place in the statistics planes.
+  for (int p = 0; p < map.properties.size(); ++p)
+    if (!map.touches.touches.empty() && table.index_of(map.properties[p].name) != p)
+      throw ConfigError(describe_mismatch(file, "properties", "those of the map, in their order, before new ones",
+                                          "'" + map.properties[p].name + "' elsewhere or not at all"));
+  map.properties = table;
+}
+
+}  // namespace felt::apps

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <Eigen/Core>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+#include "mapping/region_query.h"
+#include "mapping/touch_state.h"
+
+namespace felt::apps {
+
+/// Accepts "x,y,z" with three finite numbers; the check of options that take a point.
+std::string check_point(const std::string& text);
+Eigen::Vector3d point_of(const std::string& text);
+
+/// Options that say which voxels a touch speaks for, shared by `touch` and `region`.
+struct RegionOptions {
+  RegionSettings settings;
+  std::string rule = "connected";
+  std::string mask;                ///< picture of the rule `mask`
+  std::vector<double> intrinsics;  ///< fx, fy, cx, cy
+  std::vector<double> pose;        ///< 16 numbers, camera to world, row by row
+
+  void add_to(CLI::App& command);
+  RegionSettings resolved() const;
+  /// The mask with its camera where the rule is `mask`.
+  std::optional<ViewMask> view() const;
+};
+
+/// A number, or null where it is not finite.
+nlohmann::ordered_json number_or_null(double x);
+
+/// Class posterior and, per property, mean, sd, quantiles, CVaR, and with `below` P(psi <= below). What does not exist
+/// is null with its reason.
+nlohmann::ordered_json belief_json(const Map& map, const Belief& belief, std::optional<double> below);
+nlohmann::ordered_json summary_json(const Map& map, const RegionSummary& summary);
+nlohmann::ordered_json point_json(const Eigen::Vector3d& p);
+
+/// One line a person can read: "ice 0.97, friction 0.171 +- 0.043".
+std::string belief_text(const Map& map, const Belief& belief);
+
+/// Tables of the command line replace those of the map: properties as far as no touch needs what they lack.
+void use_properties(Map& map, const std::string& file);
+
+}  // namespace felt::apps

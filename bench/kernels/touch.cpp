@@ -1,0 +1,93 @@
+// Region query plus touch update of a region of about 100,000 voxels, one thread, as docs/measures.md asks. Every voxel
+// has counts of its own, so that the mixture model has as many states as voxels.
+#include <benchmark/benchmark.h>
+#include <tbb/global_control.h>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <cmath>
+#include <random>
+
+#include "mapping/touch_mixture.h"
+#include "mapping/touch_update.h"
+
+namespace {
+using namespace felt;
+
+/// A square floor of side x side voxels, two in its band, with k classes of which every voxel saw three, with counts
+/// drawn per voxel; the first class is always the strongest.
+Map floor_map(int side, int k) {
+  Map map(0.02, 0.08);
+  std::vector<ClassInfo> classes;
+  Property friction;
+  friction.name = "friction";
+  for (int c = 0; c < k; ++c) {
+    classes.push_back({uint16_t(c + 1), "class " + std::to_string(c), {}, false});
+    friction.priors["class " + std::to_string(c)] = {0.2 + 0.4 * c / k, 0.06, 50};
+  }
+  map.classes = ClassTable(classes);
+  map.properties = PropertyTable({friction});
+  std::mt19937 rng(1);
+  for (int x = 0; x < side; ++x)
+    for (int y = 0; y < side; ++y)
+      for (int z = 0; z < 8; ++z) {
+        Block& block = map.store[map.store.find_or_create(block_of_voxel({x, y, z}))];
+        const int i = offset_in_block({x, y, z});
+        block.geometry->tsdf[i] = float((z - 3.3) * map.voxel_size_m);
+        block.geometry->weight[i] = 5;
+        if (block.evidence.empty())
+          for (int c = 0; c < 3; ++c) block.evidence.push_back({uint16_t(c), map.store.new_plane()});
+        for (int c = 0; c < 3; ++c)
+          block.evidence[size_t(c)].counts->value[i] = float(c == 0 ? 20 : 0) + float(rng() % 100000) * 1e-4f;
+      }
+  return map;
+}
+
+TouchRequest reading(TouchModel model) {
+  TouchRequest request;
+  request.point_m = {1, 1, 3.3 * 0.02};
+  request.property = "friction";
+  request.value = 0.27;
+  request.model = model;
+  return request;
+}
+
+void touch(benchmark::State& state, TouchModel model) {
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 1);
+  Map map = floor_map(int(state.range(0)), int(state.range(1)));
+  size_t voxels = 0, computed = 0;
+  for (auto _ : state) {
+    const uint64_t id = add_touch(map, resolve_touch(map, reading(model)));
+    const Touch& recorded = *map.touches.find(id);
+    voxels = recorded.region.voxels();
+    if (model == TouchModel::material) {
+      benchmark::DoNotOptimize(Beliefs(map).of(recorded.region, {0}));
+    } else {
+      computed = 0;
+      for (const MixtureBlock& block : mixture_state(map, recorded.region).blocks) computed += block.voxels;
+    }
+    state.PauseTiming();
+    undo_touch(map, id);
+    map.touches.touches.clear();
+    state.ResumeTiming();
+  }
+  if (voxels != size_t(2 * state.range(0) * state.range(0))) state.SkipWithError("the region is not the floor");
+  if (model == TouchModel::mixture && computed != voxels) state.SkipWithError("not every voxel has a state");
+  state.counters["voxels"] = double(voxels);
+  state.counters["ns/voxel"] = benchmark::Counter(double(voxels) * double(state.iterations()) * 1e-9,
+                                                  benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+void query_and_material(benchmark::State& state) { touch(state, TouchModel::material); }
+void query_and_mixture(benchmark::State& state) { touch(state, TouchModel::mixture); }
+
+void sizes(benchmark::internal::Benchmark* b) {
+  b->Args({112, 8})->Args({224, 8})->Args({448, 8})->Args({224, 40});
+  b->Unit(benchmark::kMillisecond);
+}
+BENCHMARK(query_and_material)->Apply(sizes);
+BENCHMARK(query_and_mixture)->Apply(sizes);
+
+}  // namespace
+
+BENCHMARK_MAIN();

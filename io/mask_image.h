@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "mapping/region_query.h"
+
+namespace felt {
+
+/// An image file as a region mask (non-zero in any channel belongs to it), with `intrinsics` fx, fy, cx, cy and `pose`
+/// camera to world, 16 numbers row by row. Throws IoError and FormatError; ConfigError where the numbers are no camera.
+ViewMask read_view_mask(const std::filesystem::path& file, const std::vector<double>& intrinsics,
+                        const std::vector<double>& pose);
+
+/// Points from text: one `x,y,z` a line; a header line `x,y,z`, empty lines and lines that start with '#' are skipped.
+/// Throws IoError, and FormatError with every problem and its line.
+std::vector<Eigen::Vector3d> read_points(const std::filesystem::path& file);
+
+}  // namespace felt

@@ -1,0 +1,179 @@
+#include "io/touches.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <sstream>
+#include <utility>
+
+namespace felt {
+namespace {
+
+std::string trimmed(std::string text) {
+  const auto first = text.find_first_not_of(" \t\r\""), last = text.find_last_not_of(" \t\r\"");
+  return first == std::string::npos ? "" : text.substr(first, last - first + 1);
+}
+
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells;
+  std::istringstream stream(line);
+  for (std::string cell; std::getline(stream, cell, ',');) cells.push_back(trimmed(cell));
+  if (!line.empty() && line.back() == ',') cells.emplace_back();
+  return cells;
+}
+
+template <typename T>
+std::optional<T> number(const std::string& text) {
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+/// Column numbers by name, from the header line.
+class Columns {
+public:
+  Columns(const std::vector<std::string>& names, const std::string& where, std::vector<std::string>& problems) {
+    for (size_t i = 0; i < names.size(); ++i)
+      if (!at_.emplace(names[i], i).second)
+        problems.push_back(describe_mismatch(where, "header", "each column once", "'" + names[i] + "' twice"));
+    const auto need = [&](bool good, const char* what) {
+      if (!good) problems.push_back(describe_mismatch(where, "header", what, "none"));
+    };
+    need(has("stamp") || has("frame"), "a column stamp or frame");
+    need((has("x") && has("y") && has("z")) || (has("u") && has("v")), "columns x, y, z or u, v");
+    need(has("property"), "a column property");
+    need(has("value"), "a column value");
+  }
+  bool has(const std::string& name) const { return at_.contains(name); }
+  size_t operator[](const std::string& name) const { return at_.at(name); }
+  size_t size() const { return at_.size(); }
+
+private:
+  std::map<std::string, size_t> at_;
+};
+
+RecordedTouch parse_row(const std::vector<std::string>& cells, const Columns& columns, const std::string& where,
+                        std::vector<std::string>& problems) {
+  RecordedTouch touch;
+  const auto real = [&](const char* name) {
+    const std::string& cell = cells[columns[name]];
+    const auto value = number<double>(cell);
+    if (!value) problems.push_back(describe_mismatch(where, name, "a number", "'" + cell + "'"));
+    return value.value_or(0.0);
+  };
+  if (columns.has("stamp")) touch.stamp_s = real("stamp");
+  if (columns.has("frame")) {
+    touch.frame = number<int64_t>(cells[columns["frame"]]);
+    if (!touch.frame)
+      problems.push_back(describe_mismatch(where, "frame", "a frame number", "'" + cells[columns["frame"]] + "'"));
+  }
+  if (columns.has("x"))
+    touch.point_m = Eigen::Vector3d(real("x"), real("y"), real("z"));
+  else
+    touch.pixel = Eigen::Vector2d(real("u"), real("v"));
+  touch.property = cells[columns["property"]];
+  touch.value = real("value");
+  if (columns.has("sigma") && !cells[columns["sigma"]].empty()) touch.sigma = real("sigma");
+  return touch;
+}
+
+/// World point under a pixel of a frame: its depth there, back-projected.
+Eigen::Vector3d point_under(const Frame& frame, const Eigen::Vector2d& uv) {
+  const double u = std::floor(uv.x() + 0.5), v = std::floor(uv.y() + 0.5);
+  const auto at = [](double x, double y) { return "(" + std::to_string(int(x)) + ", " + std::to_string(int(y)) + ")"; };
+  if (!(u >= 0 && v >= 0 && u < frame.depth_m.width() && v < frame.depth_m.height()))
+    throw TouchError(describe_mismatch("touch", "pixel",
+                                       "one inside the image of " + at(frame.depth_m.width(), frame.depth_m.height()),
+                                       std::abs(u) < 1e9 && std::abs(v) < 1e9 ? at(u, v) : "one far outside"));
+  const double depth = double(frame.depth_m(int(u), int(v)));
+  if (!(depth > 0) || !std::isfinite(depth))
+    throw TouchError(describe_mismatch("touch", "pixel " + at(u, v), "a measured depth", "none"));
+  return frame.T_world_camera * (frame.camera.ray(uv.x(), uv.y()) * depth);
+}
+
+TouchRequest request_of(const RecordedTouch& touch, const TouchRequest& defaults, const TouchedSequence* sequence) {
+  TouchRequest request = defaults;
+  request.property = touch.property;
+  request.value = touch.value;
+  request.sigma = touch.sigma;
+  request.stamp_s = touch.stamp_s ? *touch.stamp_s : double(*touch.frame);
+  if (touch.point_m) request.point_m = *touch.point_m;
+  if (sequence == nullptr) {
+    if (!touch.point_m) throw TouchError("touch: expected a world point x, y, z, found a pixel without its sequence");
+    return request;
+  }
+  const auto outside = [&](auto found, auto first, auto last, const char* what) {
+    if (found >= first && found <= last) return;
+    throw TouchError(describe_mismatch("touch", what,
+                                       "one of the sequence, " + std::to_string(first) + " to " + std::to_string(last),
+                                       std::to_string(found)));
+  };
+  if (touch.frame)
+    outside(*touch.frame, sequence->first_frame, sequence->last_frame, "frame");
+  else
+    outside(*touch.stamp_s, sequence->first_stamp_s, sequence->last_stamp_s, "stamp");
+  if (touch.point_m) return request;
+  const std::optional<Frame> frame = sequence->frame_of(touch);
+  if (!frame) throw TouchError("touch: expected a readable frame at its stamp, found none");
+  request.point_m = point_under(*frame, *touch.pixel);
+  return request;
+}
+
+}  // namespace
+
+std::vector<RecordedTouch> parse_touches(const std::string& text, const std::string& where) {
+  std::vector<std::string> problems;
+  std::vector<RecordedTouch> touches;
+  std::optional<Columns> columns;
+  std::istringstream lines(text);
+  int number_of_line = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number_of_line;
+    const std::string content = trimmed(line), at = where + ":" + std::to_string(number_of_line);
+    if (content.empty() || content[0] == '#') continue;
+    const std::vector<std::string> cells = cells_of(content);
+    if (!columns) {
+      columns.emplace(cells, at, problems);
+      if (!problems.empty()) break;
+    } else if (cells.size() != columns->size()) {
+      problems.push_back(describe_mismatch(at, "cells", std::to_string(columns->size()), std::to_string(cells.size())));
+    } else {
+      touches.push_back(parse_row(cells, *columns, at, problems));
+      touches.back().line = number_of_line;
+    }
+  }
+  if (!columns) problems.push_back(describe_mismatch(where, "touches", "a header line", "an empty file"));
+  if (problems.empty()) return touches;
+  std::string all;
+  for (const std::string& problem : problems) all.append(all.empty() ? "" : "\n").append(problem);
+  throw FormatError(all);
+}
+
+std::vector<RecordedTouch> read_touches(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw IoError(describe_mismatch(file.string(), "touches", "a readable file", "none"));
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  if (stream.bad()) throw IoError(describe_mismatch(file.string(), "touches", "a readable file", "a read error"));
+  return parse_touches(text, file.string());
+}
+
+std::vector<TouchOutcome> apply_recorded_touches(Map& map, const std::vector<RecordedTouch>& touches,
+                                                 const TouchRequest& defaults, const TouchedSequence* sequence) {
+  std::vector<TouchOutcome> outcomes;
+  for (const RecordedTouch& touch : touches) {
+    TouchOutcome outcome{touch, std::nullopt, ""};
+    try {
+      outcome.effect = apply_touch(map, resolve_touch(map, request_of(touch, defaults, sequence)));
+    } catch (const Error& error) {
+      outcome.refused = error.what();
+    }
+    outcomes.push_back(std::move(outcome));
+  }
+  return outcomes;
+}
+
+}  // namespace felt

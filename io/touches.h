@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/frame.h"
+#include "mapping/touch_update.h"
+
+namespace felt {
+
+/// One row of `touches.csv`: when (a stamp or a frame number), where (a world point in metres or a pixel), what.
+struct RecordedTouch {
+  int line = 0;  ///< in the file, for messages
+  std::optional<double> stamp_s;
+  std::optional<int64_t> frame;
+  std::optional<Eigen::Vector3d> point_m;
+  std::optional<Eigen::Vector2d> pixel;  ///< (u, v)
+  std::string property;
+  double value = 0, sigma = 0;
+};
+
+/// Reads a header line that names the columns `stamp` or `frame`, `x,y,z` or `u,v`, `property`, `value` and (may be
+/// absent) `sigma`, in any order, and one touch a line; empty lines and lines that start with '#' are skipped. Throws
+/// IoError where the file cannot be read and FormatError with every problem at once, each with path:line.
+std::vector<RecordedTouch> read_touches(const std::filesystem::path& file);
+std::vector<RecordedTouch> parse_touches(const std::string& text, const std::string& where);
+
+/// The sequence that touches were recorded with.
+struct TouchedSequence {
+  double first_stamp_s = 0, last_stamp_s = 0;
+  int64_t first_frame = 0, last_frame = 0;
+  /// The frame with this number, or the one nearest to a stamp; nothing where it cannot be read.
+  std::function<std::optional<Frame>(const RecordedTouch&)> frame_of;
+};
+
+/// What became of one recorded touch.
+struct TouchOutcome {
+  RecordedTouch touch;
+  std::optional<TouchEffect> effect;
+  std::string refused;  ///< why there is no effect
+};
+
+/// Applies recorded touches to a map at their stamps. Touch state is a function of vision counts and journal, so they
+/// are all applied when the frames are fused: each region is then found in the complete map, and it makes no difference
+/// when in the sequence a touch came. `defaults` gives what a row does not say (model, region settings, ...); without a
+/// `sequence` a row needs a point, and a frame number stands for its stamp. A touch that cannot be applied leaves the
+/// map as it was and says why; the others count.
+std::vector<TouchOutcome> apply_recorded_touches(Map& map, const std::vector<RecordedTouch>& touches,
+                                                 const TouchRequest& defaults, const TouchedSequence* sequence);
+
+}  // namespace felt

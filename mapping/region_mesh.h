@@ -1,0 +1,13 @@
+#pragma once
+
+#include "core/mesh.h"
+#include "mapping/map.h"
+#include "mapping/region.h"
+
+namespace felt {
+
+/// The part of the map's surface that belongs to a region: triangles with at least two vertices nearest to a voxel of
+/// it. Normals and colours as of `extract_mesh`.
+TriangleMesh region_mesh(const Map& map, const Region& region);
+
+}  // namespace felt

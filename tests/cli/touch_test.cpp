@@ -1,0 +1,156 @@
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "io/atomic_file.h"
+#include "io/map_file.h"
+#include "io/property_yaml.h"
+#include "mapping/touch_update.h"
+#include "tests/cli/command.h"
+#include "tests/support/data.h"
+#include "tests/support/labelled_map.h"
+
+namespace felt::test {
+namespace {
+
+using nlohmann::json;
+
+/// A floor of what vision takes for snow beside one of wood (x > 0), saved.
+std::string save_floor(const TemporaryDirectory& folder) {
+  Map map = labelled_map(
+      0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
+      class_table({"wood", "snow", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 0; }, 20);
+  map.properties = read_properties(std::string(FELTMAP_SOURCE_DIR) + "/data/friction.yaml");
+  const std::string path = (folder.path() / "map.vdb").string();
+  save_map(map, path);
+  return path;
+}
+
+std::string bytes_of(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+json ask(const std::string& arguments) {
+  const CommandResult result = run_feltmap(arguments + " --json");
+  INFO(arguments << "\n" << result.err);
+  REQUIRE(result.exit_code == 0);
+  return json::parse(result.out);
+}
+
+}  // namespace
+
+TEST_CASE("one touch makes a slippery floor known, and undoing it gives the file's content back") {
+  const TemporaryDirectory folder;
+  const std::string map = save_floor(folder);
+  const std::string untouched = map_hash(load_map(map));
+  const json dry = ask("touch " + map + " --at=-0.2,0,0.01 --property friction --value 0.139 --dry-run");
+  CHECK(dry["after"]["class"] == "ice");
+  CHECK(map_hash(load_map(map)) == untouched);
+
+  const json touched = ask("touch " + map + " --at=-0.2,0,0.01 --property friction --value 0.139");
+  CHECK(touched["before"]["class"] == "snow");
+  CHECK(touched["after"]["properties"]["friction"]["gait"]["decision"] == "static");
+  CHECK(touched["relabelled_voxels"] == touched["region"]["voxels"]);
+  CHECK(touched["map_hash"] == map_hash(load_map(map)));
+
+  const json points = ask("query " + map + " --at=-0.1,0.1,0 --at=0.1,0,0 --at=0,0,3 --below 0.25")["points"];
+  CHECK(points[0]["class"] == "ice");
+  CHECK(points[0]["properties"]["friction"]["below"]["probability"].get<double>() > 0.8);
+  CHECK(points[1]["class"] == "wood");
+  CHECK(points[1]["properties"]["friction"]["touches"] == 0);
+  CHECK(points[2]["reason"] == "never observed");
+
+  const std::string id = touched["id"];
+  ask("touch " + map + " --undo " + id);
+  CHECK(map_hash(load_map(map)) == untouched);
+  CHECK(ask("query " + map + " --at=-0.1,0.1,0")["points"][0]["class"] == "snow");
+  ask("touch " + map + " --redo " + id);
+  CHECK(touched["map_hash"] == map_hash(load_map(map)));
+}
+
+TEST_CASE("recorded touches are applied all or none, into another file if told so") {
+  const TemporaryDirectory folder;
+  const std::string map = save_floor(folder), before = bytes_of(map), out = (folder.path() / "out.vdb").string(),
+                    csv = (folder.path() / "touches.csv").string();
+  write_file_atomically(csv,
+                        "stamp,x,y,z,property,value,sigma\n1,-0.2,0,0,friction,0.17,0.01\n2,0.2,0,0,friction,0.36,\n");
+  const json touched = ask("touch " + map + " --file " + csv + " --out " + out);
+  CHECK(touched["touches"].size() == 2);
+  CHECK(load_map(out).touches.touches.size() == 2);
+  CHECK(bytes_of(map) == before);
+  write_file_atomically(csv, "stamp,x,y,z,property,value\n1,-0.2,0,0,friction,0.17\n2,9,0,0,friction,0.36\n");
+  const CommandResult result = run_feltmap("touch " + map + " --file " + csv);
+  CHECK(result.exit_code == 4);
+  CHECK_THAT(result.err, Catch::Contains("touches.csv:3") && Catch::Contains("outside the map"));
+  CHECK(bytes_of(map) == before);
+}
+
+TEST_CASE("what cannot be touched is refused with one line and leaves the file alone") {
+  const TemporaryDirectory folder;
+  const std::string map = save_floor(folder), before = bytes_of(map);
+  const auto refused = [&](const std::string& arguments, int code, const std::string& reason) {
+    const CommandResult result = run_feltmap("touch " + map + " " + arguments);
+    INFO(arguments);
+    CHECK(result.exit_code == code);
+    CHECK_THAT(result.err, Catch::Contains(reason));
+    CHECK(bytes_of(map) == before);
+  };
+  refused("--at 0,0,0.5 --property friction --value 0.3", 4, "outside the map");
+  refused("--at 0.2,0,0.07 --property friction --value 0.3", 4, "free space");
+  refused("--at 0.2,0,0 --property stiffness --value 0.3", 4, "stiffness");
+  refused("--at 0.2,0,0 --property friction --value=-0.3", 4, "[0, inf]");
+  refused("--at 0.2,0,0 --property friction --value nan", 4, "value");
+  refused("--at 0.2,0 --property friction --value 0.3", 2, "x,y,z");
+  refused("--at 0.2,0,0", 2, "property");
+  refused("--undo 0123456789abcdef", 4, "no such id");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --region sphere", 4, "finite radius");
+}
+
+TEST_CASE("the region command shows what a touch would update and writes it as a mesh") {
+  const TemporaryDirectory folder;
+  const std::string map = save_floor(folder), mesh = (folder.path() / "floor.ply").string();
+  const json region = ask("region " + map + " --at=-0.2,0,0 --mesh " + mesh);
+  CHECK(region["area_m2"].get<double>() == Approx(0.4 * 0.8).epsilon(0.06));
+  CHECK(region["class_voxels"].size() == 1);
+  CHECK(region["class_voxels"]["snow"] == region["voxels"]);
+  CHECK(bytes_of(mesh).rfind("ply", 0) == 0);
+}
+
+TEST_CASE("a touch is suggested where it teaches most") {
+  const TemporaryDirectory folder;
+  const std::string map = save_floor(folder);
+  const json before = ask("suggest " + map + " --property friction")["suggestions"];
+  REQUIRE(before.size() == 2);
+  CHECK(before[0]["score"].get<double>() >= before[1]["score"].get<double>());
+  // Snow, wood and ice differ; what is known already is not worth another touch.
+  ask("touch " + map + " --at=-0.2,0,0 --property friction --value 0.19");
+  const json after = ask("suggest " + map + " --property friction")["suggestions"];
+  CHECK(after[0]["point_m"][0].get<double>() > 0);
+  CHECK(after[0]["outcomes"][0]["class"] == "wood");
+  CHECK(run_feltmap("suggest " + map + " --property stiffness").exit_code == 4);
+}
+
+TEST_CASE("the friction command prints a touch line") {
+  const TemporaryDirectory folder;
+  const std::string log = (folder.path() / "log.csv").string(), plot = (folder.path() / "log.svg").string();
+  std::string csv = "t,fx,fy,fz\n";
+  for (int i = 0; i < 400; ++i) {
+    const double load = i < 50 || i >= 350 ? 0 : 10;
+    csv +=
+        std::to_string(i * 0.01) + "," + std::to_string(i < 100 ? 0 : 0.3 * load) + ",0," + std::to_string(load) + "\n";
+  }
+  write_file_atomically(log, csv);
+  const json answer = ask("friction " + log + " --plot " + plot + " --at 1,2,3 --cutoff 5");
+  CHECK(answer["kinetic"]["mean"].get<double>() == Approx(0.3).epsilon(0.01));
+  CHECK_THAT(answer["touch"].get<std::string>(), Catch::Contains("1,2,3,friction,0.3"));
+  CHECK_THAT(bytes_of(plot), Catch::Contains("<svg"));
+  write_file_atomically(log, "t,fx,fy\n1,2,3\n");
+  const CommandResult result = run_feltmap("friction " + log);
+  CHECK(result.exit_code == 4);
+  CHECK_THAT(result.err, Catch::Contains("fz"));
+}
+
+}  // namespace felt::test

@@ -1,0 +1,101 @@
+#include "io/touches.h"
+
+#include <catch2/catch.hpp>
+#include <optional>
+#include <string>
+
+#include "io/map_file.h"
+#include "io/property_yaml.h"
+#include "io/touch_json.h"
+#include "tests/support/data.h"
+#include "tests/support/labelled_map.h"
+
+using namespace felt;
+using namespace felt::test;
+
+namespace {
+
+Map floor_map() {
+  Map map = labelled_map(
+      0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
+      class_table({"wood", "snow", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 0; });
+  map.properties = read_properties(std::string(FELTMAP_SOURCE_DIR) + "/data/friction.yaml");
+  return map;
+}
+
+}  // namespace
+
+TEST_CASE("recorded touches are read by column name") {
+  const auto touches = parse_touches(
+      "# comment\nvalue,property,frame,u,v,sigma\n0.3,friction,7,12,13.5,\n\n0.4,friction,8,1,2,0.05\n", "t.csv");
+  REQUIRE(touches.size() == 2);
+  CHECK(touches[0].line == 3);
+  CHECK(touches[0].frame == 7);
+  CHECK_FALSE(touches[0].stamp_s);
+  CHECK(touches[0].pixel->y() == 13.5);
+  CHECK(touches[0].sigma == 0);
+  CHECK(touches[1].sigma == 0.05);
+}
+
+TEST_CASE("every problem of a touch file is named with its line") {
+  CHECK_THROWS_WITH(parse_touches("stamp,x,y,z,property,value\n1,2,3,zz,friction,0.3\n1,2\n", "t.csv"),
+                    Catch::Contains("t.csv:2: z: expected a number, found 'zz'") && Catch::Contains("t.csv:3: cells"));
+  CHECK_THROWS_WITH(parse_touches("x,y,z\n", "t.csv"), Catch::Contains("stamp or frame") && Catch::Contains("value"));
+  CHECK_THROWS_WITH(parse_touches("", "t.csv"), Catch::Contains("empty file"));
+  CHECK_THROWS_AS(read_touches("/does/not/exist.csv"), IoError);
+}
+
+TEST_CASE("a pixel touch lands where its frame saw the surface, one outside the sequence is refused") {
+  Map map = floor_map();
+  Frame frame;
+  frame.index = 3;
+  frame.stamp_s = 30;
+  frame.camera = {100, 100, 50, 50, 101, 101};
+  frame.depth_m = DepthImage(101, 101, 1.0f);
+  frame.T_world_camera.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  frame.T_world_camera.translation() = Eigen::Vector3d(0, 0, 1);
+  const TouchedSequence sequence{0, 40, 0, 4, [&](const RecordedTouch&) { return std::optional(frame); }};
+  const auto outcomes = apply_recorded_touches(
+      map,
+      parse_touches("stamp,u,v,property,value\n30,30,50,friction,0.2\n50,30,50,friction,0.2\n30,500,50,friction,0.2\n",
+                    "t"),
+      {}, &sequence);
+  REQUIRE(outcomes.size() == 3);
+  REQUIRE(outcomes[0].effect);
+  const Touch& touch = *map.touches.find(outcomes[0].effect->id);
+  CHECK((touch.surface_m - Eigen::Vector3d(-0.2, 0, 0)).norm() < 0.011);
+  CHECK_THAT(outcomes[1].refused, Catch::Contains("stamp"));
+  CHECK_THAT(outcomes[2].refused, Catch::Contains("pixel"));
+  CHECK(map.touches.touches.size() == 1);
+}
+
+TEST_CASE("a touched map goes through its file unchanged, touches, regions and undone ones included") {
+  const TemporaryDirectory folder;
+  Map map = floor_map();
+  TouchRequest request;
+  request.property = "friction";
+  request.point_m = {-0.2, 0, 0};
+  request.value = 0.2;
+  request.rho = 0.25;
+  const uint64_t first = apply_touch(map, resolve_touch(map, request)).id;
+  request.model = TouchModel::mixture;
+  request.value = 0.3;
+  request.sigma = 0.01;
+  apply_touch(map, resolve_touch(map, request));
+  undo_touch(map, first);
+  save_map(map, folder.path() / "map.vdb");
+  Map loaded = load_map(folder.path() / "map.vdb");
+  CHECK(map_hash(loaded) == map_hash(map));
+  CHECK(loaded.properties == map.properties);
+  REQUIRE(loaded.touches.touches.size() == 2);
+  for (size_t t = 0; t < 2; ++t) {
+    CHECK(loaded.touches.touches[t].region == map.touches.touches[t].region);
+    CHECK(loaded.touches.touches[t].undone == map.touches.touches[t].undone);
+    CHECK(loaded.touches.touches[t].after.mean == map.touches.touches[t].after.mean);
+    CHECK(touch_journal_json(loaded.touches) == touch_journal_json(map.touches));
+  }
+  redo_touch(loaded, first);
+  redo_touch(map, first);
+  CHECK(map_hash(loaded) == map_hash(map));
+  CHECK_THROWS_AS(parse_touch_journal("[{\"id\": 3}]", "m"), FormatError);
+}

@@ -1,0 +1,300 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "inference/mixture.h"
+#include "mapping/touch_mixture.h"
+#include "mapping/touch_update.h"
+#include "mapping/touch_view.h"
+#include "tests/support/labelled_map.h"
+
+using namespace felt;
+using namespace felt::test;
+
+namespace {
+
+constexpr double kVoxel = 0.02;
+
+PropertyTable friction() {
+  Property p;
+  p.name = "friction";
+  p.support_lo = 0;
+  p.priors = {{"concrete", {0.543, 0.065, 50}}, {"grass", {0.577, 0.077, 50}},  {"rock", {0.478, 0.133, 50}},
+              {"wood", {0.372, 0.055, 50}},     {"rubber", {0.616, 0.048, 50}}, {"plastic", {0.311, 0.045, 50}},
+              {"snow", {0.390, 0.071, 50}},     {"ice", {0.192, 0.046, 50}}};
+  return PropertyTable({p});
+}
+
+const std::vector<std::string> kMaterials{"concrete", "grass", "rock", "wood", "rubber", "plastic", "snow", "ice"};
+enum Material { concrete, grass, rock, wood, rubber, plastic, snow, ice };
+
+/// A floor of two materials that meet at x = 0, with `counts` observations of the class that vision takes them for.
+Map two_floors(int left, int right, float counts) {
+  Map map = labelled_map(
+      kVoxel, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
+      class_table(kMaterials), [&](const Eigen::Vector3d& p) { return p.x() < 0 ? left : right; }, counts);
+  map.properties = friction();
+  return map;
+}
+
+TouchRequest reading(double x, double y, double value, double stamp_s = 0, TouchModel model = TouchModel::material) {
+  TouchRequest request;
+  request.stamp_s = stamp_s;
+  request.point_m = {x, y, 0};
+  request.property = "friction";
+  request.value = value;
+  request.model = model;
+  return request;
+}
+
+uint64_t touch(Map& map, const TouchRequest& request) { return add_touch(map, resolve_touch(map, request)); }
+
+/// Vision counts that a later frame would add.
+void another_frame(Map& map, int slot) {
+  for (Block& block : map.store.blocks())
+    for (int i = 0; i < kBlockVoxels; ++i)
+      if (std::abs(block.geometry->tsdf[i]) <= float(kVoxel) && block.geometry->weight[i] > 0) {
+        const Index3 f = first_voxel(block.coord), v = voxel_of_offset(i);
+        add_evidence(map, {f.x + v.x, f.y + v.y, f.z + v.z}, slot, 1);
+      }
+}
+
+double expected_friction(Beliefs& beliefs, const Index3& voxel) { return *mean(beliefs.at(voxel).next_reading[0]); }
+
+}  // namespace
+
+TEST_CASE(
+    "ice that vision calls snow or concrete is crossed with care after one slippery touch, not after a rough one") {
+  for (const int seen_as : {snow, concrete})
+    for (const auto& [value, careful] : {std::pair(0.139, true), {0.156, true}, {0.628, false}}) {
+      INFO("seen as " << kMaterials[size_t(seen_as)] << ", reading " << value);
+      Map map = two_floors(seen_as, seen_as, 50);
+      touch(map, reading(0.1, 0.1, value));
+      Beliefs beliefs(map);
+      CHECK((expected_friction(beliefs, {3, 3, 0}) <= 0.25) == careful);
+      CHECK((most_probable_class(beliefs.at({-15, 9, 0}).class_probability) == ice) == careful);
+    }
+}
+
+TEST_CASE("a touched region has the scalar material posterior of its pooled belief, and untouched voxels their prior") {
+  Map map = two_floors(snow, wood, 7);
+  touch(map, reading(-0.2, 0, 0.3));
+  touch(map, reading(-0.1, 0.1, 0.27, 1));
+  const Region region = map.touches.touches[0].region;
+  REQUIRE(region == map.touches.touches[1].region);
+  const std::vector<double> pooled = pooled_belief(map, region);
+  CHECK(pooled[snow] == Approx(8.0 / 15).epsilon(1e-12));
+  const MaterialPosterior expected = material_posterior(pooled, nig_priors(map.properties[0], map.classes),
+                                                        statistics_of(std::vector{0.3, 0.27}), 0.5);
+  Beliefs beliefs(map);
+  const Belief inside = beliefs.at({-10, 0, 0}), outside = beliefs.at({10, 0, 0});
+  for (size_t c = 0; c < 8; ++c) {
+    CHECK(inside.class_probability[c] == Approx(expected.belief.p[c]).epsilon(1e-12));
+    CHECK(inside.next_reading[0].component[c].location ==
+          Approx(expected.classes[c].next_here.location).epsilon(1e-12));
+    CHECK(outside.class_probability[c] == Approx((c == wood ? 8 : 1) / 15.0).epsilon(1e-12));
+    CHECK(outside.nig[0][c] == nig_priors(map.properties[0], map.classes)[c]);
+  }
+  CHECK(inside.log_evidence[0] == Approx(expected.belief.log_evidence).epsilon(1e-12));
+}
+
+TEST_CASE("statistics planes hold the readings that cover a voxel, and only in touched blocks") {
+  Map map = two_floors(snow, wood, 7);
+  touch(map, reading(-0.2, 0, 0.3));
+  touch(map, reading(-0.1, 0.1, 0.5, 1));
+  const Block& touched = *map.store.get(block_of_voxel({-10, 0, 0}));
+  REQUIRE(touched.touch.size() == 1);
+  const int i = offset_in_block({-10, 0, 0});
+  CHECK(touched.touch[0].n->value[i] == 2);
+  CHECK(touched.touch[0].mean->value[i] == Approx(0.4f));
+  CHECK(touched.touch[0].m2->value[i] == Approx(0.02f));
+  CHECK(map.store.get(block_of_voxel({10, 0, 0}))->touch.empty());
+}
+
+TEST_CASE("touches in any order, before, between and after frames, give the same map") {
+  std::vector<TouchRequest> requests{reading(-0.2, 0, 0.15, 3), reading(-0.1, 0.1, 0.17, 1), reading(0.2, 0, 0.4, 2),
+                                     reading(0.2, 0.1, 0.38, 2, TouchModel::mixture), reading(-0.2, 0, 0.15, 3)};
+  requests[1].region.rule = RegionRule::sphere;
+  requests[1].region.radius_m = 0.15;
+  std::mt19937 rng(7);
+  std::string expected;
+  std::vector<double> belief;
+  for (int trial = 0; trial < 8; ++trial) {
+    Map map = two_floors(snow, wood, 7);
+    std::vector<Touch> touches;
+    for (const TouchRequest& request : requests) touches.push_back(resolve_touch(map, request));
+    std::shuffle(touches.begin(), touches.end(), rng);
+    // Frames come after the first `frame` touches.
+    const size_t frame = size_t(trial) % (touches.size() + 1);
+    for (size_t t = 0; t <= touches.size(); ++t) {
+      if (t == frame) another_frame(map, snow), another_frame(map, concrete);
+      if (t < touches.size()) add_touch(map, touches[t]);
+    }
+    const std::vector<double> p = Beliefs(map).at({-10, 0, 0}).class_probability;
+    if (trial == 0) expected = map_hash(map), belief = p;
+    CHECK(map_hash(map) == expected);
+    CHECK(p == belief);
+  }
+}
+
+TEST_CASE("undo gives back the map as it was, redo the map as it became") {
+  Map map = two_floors(snow, wood, 7);
+  const std::string untouched = map_hash(map);
+  const uint64_t first = touch(map, reading(-0.2, 0, 0.3));
+  const std::string once = map_hash(map);
+  const uint64_t second = touch(map, reading(-0.2, 0.1, 0.5, 1));
+  const std::string twice = map_hash(map);
+  CHECK(untouched != once);
+  CHECK(once != twice);
+  undo_touch(map, first);
+  CHECK(map_hash(map) != twice);
+  redo_touch(map, first);
+  CHECK(map_hash(map) == twice);
+  undo_touch(map, second);
+  CHECK(map_hash(map) == once);
+  undo_touch(map, first);
+  CHECK(map_hash(map) == untouched);
+  CHECK(Beliefs(map).at({-10, 0, 0}).readings[0] == 0);
+  CHECK_THROWS_WITH(undo_touch(map, first), Catch::Contains("undone already"));
+  CHECK_THROWS_WITH(undo_touch(map, 1), Catch::Contains("no such id"));
+}
+
+TEST_CASE("each voxel of a mixture region has the scalar update of its own state") {
+  Map map = two_floors(snow, wood, 3);
+  std::mt19937 rng(3);
+  for (const Index3 v : {Index3{-10, 0, 0}, {-9, 3, 1}, {-1, 7, -1}, {-17, -8, 0}})
+    for (int slot = 0; slot < 8; ++slot) add_evidence(map, v, slot, float(rng() % 3));
+  touch(map, reading(-0.2, 0.05, 0.25, 0, TouchModel::mixture));
+  touch(map, reading(-0.2, 0.05, 0.41, 1, TouchModel::mixture));
+  const std::vector<Nig> priors = nig_priors(map.properties[0], map.classes);
+  const MixtureState state = mixture_state(map, map.touches.touches[0].region);
+  size_t voxels = 0;
+  for (const MixtureBlock& block : state.blocks) {
+    const size_t m = block.voxels;
+    voxels += m;
+    size_t i = 0;
+    for_each_bit(block.mask, [&](int offset) {
+      std::vector<double> a(8, 1.0);
+      for (const EvidencePlane& e : map.store.get(block.coord)->evidence) a[e.slot] += double(e.counts->value[offset]);
+      const MixtureUpdate once = mixture_update(a, priors, 0.25), twice = mixture_update(once.a, once.nig, 0.41);
+      for (size_t c = 0; c < 8; ++c) {
+        // The kernel's own bounds (inference/batch_mixture.h) for two readings; the log evidences stay below 20.
+        const Nig nig = state.nig(block, block.properties[0], c, i), &exact = twice.nig[c];
+        REQUIRE(block.a[c * m + i] == Approx(twice.a[c]).epsilon(4e-5));
+        REQUIRE(std::abs(nig.tau - exact.tau) < 6e-5 * std::sqrt(plug_in_variance(exact)));
+        REQUIRE(nig.kappa == Approx(exact.kappa).epsilon(6e-5));
+        REQUIRE(nig.beta == Approx(exact.beta).epsilon(6e-5));
+        REQUIRE(nig.gamma == Approx(exact.gamma).epsilon(6e-5));
+      }
+      ++i;
+    });
+  }
+  CHECK(voxels == map.touches.touches[0].region.voxels());
+}
+
+TEST_CASE("a voxel that the published projection cannot serve keeps its state and is counted") {
+  Map map = two_floors(snow, wood, 1);
+  Property door;
+  door.name = "door";
+  door.priors = {{"snow", {-20, 3.2, 1}}, {"wood", {20, 3.2, 1}}};
+  map.properties = PropertyTable({door});
+  TouchRequest request = reading(0.2, 0, 57, 0, TouchModel::mixture);
+  request.property = "door";
+  request.projection = Projection::published;
+  const TouchEffect effect = apply_touch(map, resolve_touch(map, request));
+  const Touch& recorded = *map.touches.find(effect.id);
+  CHECK(effect.refused == recorded.region.voxels());
+  CHECK(recorded.refused_voxels == effect.refused);
+  const Belief belief = Beliefs(map).at({10, 0, 0});
+  CHECK(belief.nig[0][snow] == nig_priors(door, map.classes)[snow]);
+  CHECK(belief.concentration[wood] == 2);
+}
+
+TEST_CASE("a touch says what it changed, and flags a reading that no class explains") {
+  Map map = two_floors(snow, wood, 20);
+  const TouchEffect effect = apply_touch(map, resolve_touch(map, reading(-0.2, 0, 0.15)));
+  const Region& region = map.touches.find(effect.id)->region;
+  CHECK(most_probable_class(effect.before.class_probability) == snow);
+  CHECK(most_probable_class(effect.after.class_probability) == ice);
+  CHECK(effect.relabelled == region.voxels());
+  CHECK_FALSE(effect.flags.surprising);
+  const TouchEffect strange = apply_touch(map, resolve_touch(map, reading(-0.2, 0, 3.0, 1)));
+  CHECK(strange.flags.surprising);
+  CHECK(strange.tail_probability < 1e-3);
+}
+
+TEST_CASE("views hold the label and the property of touched voxels") {
+  Map map = two_floors(snow, wood, 20);
+  touch(map, reading(-0.2, 0, 0.15));
+  touch(map, reading(0.2, 0, 0.37, 0, TouchModel::mixture));
+  Beliefs beliefs(map);
+  size_t voxels = 0;
+  for (const TouchView& view : touch_views(map))
+    for_each_bit(view.mask, [&](int i) {
+      ++voxels;
+      const Index3 f = first_voxel(view.coord), v = voxel_of_offset(i);
+      const Belief belief = beliefs.at({f.x + v.x, f.y + v.y, f.z + v.z});
+      REQUIRE(view.label[size_t(i)] == most_probable_class(belief.class_probability));
+      REQUIRE(view.mean[0][size_t(i)] == Approx(*mean(belief.next_reading[0])).epsilon(1e-5));
+      REQUIRE(view.sd[0][size_t(i)] == Approx(std::sqrt(*variance(belief.next_reading[0]))).epsilon(1e-4));
+    });
+  CHECK(voxels == map.touches.touches[0].region.voxels() + map.touches.touches[1].region.voxels());
+}
+
+TEST_CASE("untouched segments keep every bit") {
+  Map map = two_floors(snow, wood, 20);
+  const Block before = *map.store.get(block_of_voxel({10, 0, 0}));
+  const Belief belief = Beliefs(map).at({10, 0, 0});
+  touch(map, reading(-0.2, 0, 0.15));
+  const Block& after = *map.store.get(block_of_voxel({10, 0, 0}));
+  CHECK(std::equal(std::begin(before.geometry->tsdf), std::end(before.geometry->tsdf), after.geometry->tsdf));
+  CHECK(after.touch.empty());
+  CHECK(Beliefs(map).at({10, 0, 0}).class_probability == belief.class_probability);
+}
+
+TEST_CASE("a reading that cannot be true is refused with the reason and leaves the map as it was") {
+  Map map = two_floors(snow, wood, 4);
+  const std::string before = map_hash(map);
+  const auto refused = [&](const TouchRequest& request, const std::string& reason) {
+    CHECK_THROWS_WITH(touch(map, request), Catch::Contains(reason));
+    CHECK(map_hash(map) == before);
+    CHECK(map.touches.touches.empty());
+  };
+  TouchRequest request = reading(0, 0, 0.3);
+  request.property = "stiffness";
+  refused(request, "property: expected friction, found 'stiffness'");
+  refused(reading(0, 0, -0.3), "a number in [0, inf]");
+  refused(reading(0, 0, NAN), "value");
+  refused(reading(NAN, 0, 0.3), "finite coordinates");
+  refused(reading(0, 9, 0.3), "outside the map");
+  request = reading(0, 0, 0.3);
+  request.sigma = -1;
+  refused(request, "sigma");
+  request.sigma = 0;
+  request.rho = 1;
+  refused(request, "rho");
+  request.rho = NAN;
+  request.region.rule = RegionRule::mask;
+  refused(request, "mask image");
+  map.classes = class_table({"carpet", "tiles"});
+  refused(reading(0.1, 0, 0.3), "with a prior");
+}
+
+TEST_CASE("joining two journals gives every touch once, whichever comes first") {
+  Map map = two_floors(snow, wood, 4);
+  TouchJournal left, right;
+  const Touch shared = resolve_touch(map, reading(-0.2, 0, 0.3, 2));
+  insert(left, resolve_touch(map, reading(-0.2, 0, 0.2, 3)));
+  insert(left, shared);
+  insert(right, resolve_touch(map, reading(0.2, 0, 0.4, 1)));
+  insert(right, shared);
+  const TouchJournal both = joined(left, right);
+  REQUIRE(both.touches.size() == 3);
+  CHECK(both.touches[0].request.stamp_s == 1);
+  CHECK(both.touches[2].request.stamp_s == 3);
+  CHECK(journal_digest(both) == journal_digest(joined(right, left)));
+}
