@@ -42,7 +42,7 @@ private:
   std::vector<T> pixels_;
 };
 
-/// Four bytes so that one 32-bit gather fetches a pixel; `a` is unused (255).
+/// Four bytes so that one 32-bit gather fetches a pixel; `a` is 255, or 0 where a reader found no colour for the pixel.
 struct Rgba8 {
   uint8_t r = 0, g = 0, b = 0, a = 255;
   bool operator==(const Rgba8&) const = default;
@@ -50,7 +50,10 @@ struct Rgba8 {
 
 using DepthImage = Image<float>;     ///< metres along the optical axis; 0 where nothing was measured
 using ColorImage = Image<Rgba8>;     ///< sRGB, as stored
-using LabelImage = Image<uint16_t>;  ///< class ids of the class table
+using LabelImage = Image<uint16_t>;  ///< class ids of the class table, or kNoLabel
+
+/// Pixel that no label was seen for (outside the labelled image).
+inline constexpr uint16_t kNoLabel = 0xffff;
 
 /// Per pixel the m most probable classes (interleaved: entry i of pixel p at `[p * m + i]`), probabilities in [0, 1].
 /// Mass missing from 1 belongs to classes that were not kept.

@@ -5,7 +5,9 @@
 #include <memory>
 #include <string>
 #include <variant>
+#include <vector>
 
+#include "core/class_table.h"
 #include "core/frame.h"
 
 namespace felt {
@@ -19,11 +21,26 @@ struct SkippedFrame {
 
 using ReadResult = std::variant<Frame, SkippedFrame>;
 
+/// What is known of a sequence before its first frame is decoded.
+struct SequenceInfo {
+  std::string layout;          ///< "7scenes", "tum", ...
+  std::filesystem::path path;  ///< as opened
+  PinholeCamera camera;        ///< of the depth images
+  double depth_scale = 0;      ///< stored depth units per metre
+  std::string pose_convention;
+  bool has_color = false, has_labels = false, has_probabilities = false, has_instances = false;
+  ClassTable classes;              ///< empty where the sequence brings none
+  int64_t recorded_frames = 0;     ///< before the selection of frames
+  std::vector<std::string> notes;  ///< what was assumed or repaired, one sentence each
+};
+
 /// A recorded sequence. Opening reads what is small (poses, file names, stamps, camera); `read` decodes one frame and
 /// may be called from several threads at once, which is how decoding runs ahead of fusion.
 class SequenceReader {
 public:
   virtual ~SequenceReader() = default;
+  virtual const SequenceInfo& info() const = 0;
+  /// Number of selected frames.
   virtual int64_t size() const = 0;
   /// Frame at position 0 <= i < size() in recorded order. Never throws for a bad frame.
   virtual ReadResult read(int64_t i) const = 0;

@@ -1,0 +1,144 @@
+#include "io/class_table_file.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <array>
+
+#include "core/error.h"
+#include "io/text_input.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr size_t kLimitBytes = 1 << 24;
+
+struct Table {
+  std::vector<ClassInfo> classes;
+  std::vector<std::string> problems;
+};
+
+bool means_no_class(const std::string& name) {
+  constexpr std::array kNames = {"unknown", "unlabelled", "unlabeled", "none", "void", "background", "ignore"};
+  return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
+}
+
+std::optional<uint16_t> id_of(std::string_view word) {
+  const auto number = parse_integer(word);
+  return number && *number >= 0 && *number <= 0xffff ? std::optional<uint16_t>(uint16_t(*number)) : std::nullopt;
+}
+
+std::optional<Rgba8> color_of(const std::vector<std::string>& words) {
+  std::array<uint8_t, 3> channel{};
+  if (words.size() != 3) return std::nullopt;
+  for (size_t i = 0; i < 3; ++i) {
+    const auto number = parse_integer(words[i]);
+    if (!number || *number < 0 || *number > 255) return std::nullopt;
+    channel[i] = uint8_t(*number);
+  }
+  return Rgba8{channel[0], channel[1], channel[2], 255};
+}
+
+std::string scalar_text(const YAML::Node& node) { return node && node.IsScalar() ? node.Scalar() : std::string(); }
+
+void read_yaml_class(const YAML::Node& row, const fs::path& path, Table& table) {
+  const std::string where = path.string() + ":" + std::to_string(row.Mark().line + 1);
+  if (!row.IsMap()) {
+    table.problems.push_back(describe_mismatch(where, "class", "{id, name, color, ignore}", "something else"));
+    return;
+  }
+  ClassInfo info;
+  const int number = int(table.classes.size());
+  const auto id = id_of(scalar_text(row["id"]));
+  if (id)
+    info.id = *id;
+  else
+    table.problems.push_back(
+        describe_mismatch(where, "id", "a number from 0 to 65535", "'" + scalar_text(row["id"]) + "'"));
+  info.name = scalar_text(row["name"]);
+  if (info.name.empty()) table.problems.push_back(describe_mismatch(where, "name", "a name", "none"));
+  info.color = default_class_color(number);
+  if (row["color"]) {
+    std::vector<std::string> words;
+    if (row["color"].IsSequence())
+      for (const YAML::Node& channel : row["color"]) words.push_back(scalar_text(channel));
+    if (const auto color = color_of(words))
+      info.color = *color;
+    else
+      table.problems.push_back(describe_mismatch(where, "color", "[r, g, b] from 0 to 255", "something else"));
+  }
+  if (row["ignore"]) {
+    bool ignore = false;
+    if (YAML::convert<bool>::decode(row["ignore"], ignore))
+      info.ignore = ignore;
+    else
+      table.problems.push_back(
+          describe_mismatch(where, "ignore", "true or false", "'" + scalar_text(row["ignore"]) + "'"));
+  }
+  for (const auto& entry : row) {
+    const std::string key = scalar_text(entry.first);
+    if (key != "id" && key != "name" && key != "color" && key != "ignore")
+      table.problems.push_back(describe_mismatch(where, "key", "id, name, color or ignore", "'" + key + "'"));
+  }
+  // A class whose id is unreadable would also be reported as a duplicate of class 0.
+  if (id && !info.name.empty()) table.classes.push_back(info);
+}
+
+Table read_yaml(const fs::path& path, const std::string& content) {
+  Table table;
+  try {
+    const YAML::Node root = YAML::Load(content);
+    if (!root.IsMap() || !root["classes"] || !root["classes"].IsSequence())
+      throw ConfigError(describe_mismatch(path.string(), "classes", "a list under the key 'classes'", "none"));
+    for (const YAML::Node& row : root["classes"]) read_yaml_class(row, path, table);
+  } catch (const YAML::Exception& fault) {
+    throw ConfigError(path.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
+  }
+  return table;
+}
+
+Table read_csv(const fs::path& path, const std::string& content) {
+  Table table;
+  LineReader lines(content, path);
+  bool first = true;
+  while (lines.next()) {
+    const char separator = lines.line().find(';') != std::string_view::npos ? ';' : ',';
+    std::vector<std::string> words;
+    for (size_t at = 0; at <= lines.line().size();) {
+      const size_t end = std::min(lines.line().find(separator, at), lines.line().size());
+      words.emplace_back(lines.line().substr(at, end - at));
+      at = end + 1;
+    }
+    const auto id = id_of(words[0]);
+    const bool header = first && !id;
+    first = false;
+    if (header) continue;
+    if (!id || words.size() < 2 || words[1].empty()) {
+      table.problems.push_back(describe_mismatch(lines.where(), "class", "id" + std::string(1, separator) + "name",
+                                                 "'" + std::string(lines.line().substr(0, 60)) + "'"));
+      continue;
+    }
+    ClassInfo info{*id, words[1], default_class_color(int(table.classes.size())), *id == 0 && means_no_class(words[1])};
+    if (words.size() >= 5)
+      if (const auto color = color_of({words[2], words[3], words[4]})) info.color = *color;
+    table.classes.push_back(info);
+  }
+  return table;
+}
+
+}  // namespace
+
+ClassTable read_class_table(const fs::path& path) {
+  const std::string content = read_whole_file(path, kLimitBytes);
+  Table table = path.extension() == ".csv" ? read_csv(path, content) : read_yaml(path, content);
+  try {
+    ClassTable classes(std::move(table.classes));
+    if (table.problems.empty()) return classes;
+  } catch (const ConfigError& fault) {
+    table.problems.push_back(path.string() + ": " + fault.what());
+  }
+  throw ConfigError(table.problems);
+}
+
+}  // namespace felt

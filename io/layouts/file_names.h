@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace felt {
+
+/// Number that ends a file's stem: 12 for "depth000012.png", "12.jpg" and "frame-000012". Nothing where there is none.
+std::optional<int64_t> trailing_number(std::string_view stem);
+
+/// Files directly in `folder` whose name is `prefix`, a number, `suffix` (one of `suffixes`), by that number. Numbers
+/// sort as numbers, whether or not they are padded with zeros. Empty where the folder is absent.
+/// Throws IoError where the folder cannot be listed and FormatError where two names hold one number.
+std::map<int64_t, std::filesystem::path> numbered_files(const std::filesystem::path& folder, const std::string& prefix,
+                                                        const std::vector<std::string>& suffixes);
+
+/// True where `folder` directly holds at least one such file.
+bool has_numbered_file(const std::filesystem::path& folder, const std::string& prefix,
+                       const std::vector<std::string>& suffixes);
+
+/// First of `names` that exists in `folder`, or an empty path.
+std::filesystem::path first_existing(const std::filesystem::path& folder, const std::vector<std::string>& names);
+
+}  // namespace felt

@@ -1,0 +1,181 @@
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <set>
+
+#include "core/error.h"
+#include "io/camera_file.h"
+#include "io/class_table_file.h"
+#include "io/layouts.h"
+#include "io/layouts/file_names.h"
+#include "io/text_input.h"
+#include "io/trajectory_file.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+bool recognises(const fs::path& path) { return fs::exists(path / "sequence.yaml"); }
+
+/// Reads `sequence.yaml`, gathering every problem.
+class Settings {
+public:
+  Settings(const YAML::Node& root, const fs::path& file) : root_(root), file_(file) {}
+
+  std::string text(const char* key, const std::string& otherwise) {
+    const YAML::Node node = root_[key];
+    if (!node) return otherwise;
+    if (!node.IsScalar()) problem(node, key, "a text", "something else");
+    return node.IsScalar() ? node.Scalar() : otherwise;
+  }
+  double positive(const YAML::Node& parent, const char* key, std::optional<double> otherwise) {
+    const YAML::Node node = parent[key];
+    if (!node && otherwise) return *otherwise;
+    const auto number = node && node.IsScalar() ? parse_number(node.Scalar()) : std::nullopt;
+    if (number && std::isfinite(*number) && *number > 0) return *number;
+    problem(node ? node : parent, key, "a number above 0",
+            node && node.IsScalar() ? "'" + node.Scalar() + "'" : "nothing");
+    return 1;
+  }
+  void problem(const YAML::Node& node, const std::string& key, const std::string& expected, const std::string& found) {
+    problems.push_back(
+        describe_mismatch(file_.string() + ":" + std::to_string(node.Mark().line + 1), key, expected, found));
+  }
+  void refuse_unknown(const YAML::Node& node, const std::set<std::string>& known) {
+    std::string names;
+    for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
+    for (const auto& entry : node)
+      if (!entry.first.IsScalar() || !known.contains(entry.first.Scalar()))
+        problem(entry.first, "key", "one of " + names,
+                entry.first.IsScalar() ? "'" + entry.first.Scalar() + "'" : "a list");
+  }
+
+  std::vector<std::string> problems;
+
+private:
+  const YAML::Node& root_;
+  const fs::path& file_;
+};
+
+void read_settings(const fs::path& file, SequenceListing& listing, std::map<std::string, std::string>& paths) {
+  const YAML::Node root = YAML::Load(read_whole_file(file, 1 << 20));
+  if (!root.IsMap())
+    throw FormatError(describe_mismatch(file.string(), "content", "keys and values", "something else"));
+  Settings settings(root, file);
+  settings.refuse_unknown(root, {"camera", "color_camera", "depth_scale", "depth_encoding", "depth_is_ray_length",
+                                 "pose_convention", "paths", "name", "comment"});
+  const auto camera_of = [&](const YAML::Node& node, int& width, int& height) {
+    settings.refuse_unknown(node, {"fx", "fy", "cx", "cy", "width", "height"});
+    width = int(std::min(settings.positive(node, "width", std::nullopt), 1e6));
+    height = int(std::min(settings.positive(node, "height", std::nullopt), 1e6));
+    return Intrinsics{settings.positive(node, "fx", std::nullopt), settings.positive(node, "fy", std::nullopt),
+                      settings.positive(node, "cx", std::nullopt), settings.positive(node, "cy", std::nullopt)};
+  };
+  if (const YAML::Node camera = root["camera"]; camera && camera.IsMap())
+    listing.intrinsics = camera_of(camera, listing.width, listing.height);
+  else
+    settings.problem(root, "camera", "{fx, fy, cx, cy, width, height}", "nothing");
+  if (const YAML::Node camera = root["color_camera"]; camera && camera.IsMap()) {
+    int width = 0, height = 0;
+    listing.color_intrinsics = camera_of(camera, width, height);
+  }
+  listing.depth_scale = settings.positive(root, "depth_scale", 1000);
+  if (const YAML::Node flag = root["depth_is_ray_length"];
+      flag && !YAML::convert<bool>::decode(flag, listing.depth_is_ray_length))
+    settings.problem(flag, "depth_is_ray_length", "true or false", "something else");
+  try {
+    listing.pose_convention = parse_pose_convention(settings.text("pose_convention", "camera-to-world"), file.string());
+    listing.depth_encoding = parse_depth_encoding(settings.text("depth_encoding", "plain"), file.string());
+  } catch (const ConfigError& fault) {
+    settings.problems.push_back(fault.what());
+  }
+  if (const YAML::Node given = root["paths"]; given && given.IsMap()) {
+    std::set<std::string> known;
+    for (const auto& [key, value] : paths) known.insert(key);
+    settings.refuse_unknown(given, known);
+    for (auto& [key, value] : paths)
+      if (given[key] && given[key].IsScalar()) value = given[key].Scalar();
+  }
+  if (!settings.problems.empty()) throw ConfigError(settings.problems);
+}
+
+SequenceListing list(const fs::path& path, const SequenceOptions& options) {
+  SequenceListing listing;
+  std::map<std::string, std::string> paths = {
+      {"color", "color"},         {"depth", "depth"},     {"labels", "labels"},       {"probs", "probs"},
+      {"instances", "instances"}, {"poses", "poses.txt"}, {"classes", "classes.yaml"}};
+  const fs::path file = path / "sequence.yaml";
+  try {
+    read_settings(file, listing, paths);
+  } catch (const YAML::Exception& fault) {
+    throw ConfigError(file.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
+  }
+  const auto images = [&](const char* key) { return numbered_files(path / paths[key], "", {".png", ".jpg", ".jpeg"}); };
+  const auto depth = images("depth"), color = images("color"), labels = images("labels"), probs = images("probs"),
+             instances = images("instances");
+  const std::vector<StampedPose> poses = read_trajectory(path / paths["poses"], true);
+
+  // The first column of poses.txt holds frame numbers where all of them name a frame; else stamps, one a frame in
+  // order.
+  std::vector<double> numbers;
+  bool by_number = true;
+  for (const StampedPose& pose : poses) {
+    numbers.push_back(pose.stamp_s);
+    by_number &= pose.stamp_s == std::floor(pose.stamp_s) && std::abs(pose.stamp_s) < 1e9;
+  }
+  if (!by_number && poses.size() != depth.size())
+    throw FormatError(describe_mismatch(
+        (path / paths["poses"]).string(), "poses",
+        "frame numbers, or a stamp for each of the " + std::to_string(depth.size()) + " depth images in order",
+        std::to_string(poses.size()) + " stamps"));
+  const std::vector<bool> disordered = out_of_order(numbers);
+  std::map<int64_t, const StampedPose*> pose_of;
+  if (by_number)
+    for (const StampedPose& pose : poses) {
+      const auto [other, is_new] = pose_of.emplace(int64_t(pose.stamp_s), &pose);
+      if (!is_new)
+        throw FormatError(describe_mismatch((path / paths["poses"]).string() + ":" + std::to_string(pose.line),
+                                            "frame number", "each once", std::to_string(other->first) + " again"));
+    }
+  std::set<int64_t> all;
+  for (const auto* files : {&depth, &color})
+    for (const auto& [number, image] : *files) all.insert(number);
+  for (const auto& [number, pose] : pose_of) all.insert(number);
+  const auto at = [](const std::map<int64_t, fs::path>& files, int64_t number) {
+    const auto found = files.find(number);
+    return found == files.end() ? fs::path() : found->second;
+  };
+  size_t position = 0;
+  for (const int64_t number : all) {
+    FrameRecord frame;
+    frame.index = number;
+    frame.stamp_s = double(number);
+    frame.depth.path = at(depth, number);
+    frame.color.path = at(color, number);
+    frame.labels.path = at(labels, number);
+    frame.probabilities.path = at(probs, number);
+    frame.instances.path = at(instances, number);
+    if (by_number) {
+      if (const auto found = pose_of.find(number); found != pose_of.end()) frame.pose = found->second->matrix;
+    } else if (!frame.depth.empty()) {
+      frame.stamp_s = poses[position].stamp_s;
+      frame.pose = poses[position].matrix;
+      if (disordered[position]) {
+        frame.fault = "stamp out of order";
+        frame.fault_detail = (path / paths["poses"]).string() + ":" + std::to_string(poses[position].line) +
+                             ": not after the stamps before it";
+      }
+      ++position;
+    }
+    listing.frames.push_back(std::move(frame));
+  }
+  if (options.classes_file.empty() && fs::exists(path / paths["classes"]))
+    listing.classes = read_class_table(path / paths["classes"]);
+  return listing;
+}
+
+}  // namespace
+
+const Layout kGenericLayout = {"generic", "sequence.yaml", recognises, list};
+
+}  // namespace felt

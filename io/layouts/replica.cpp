@@ -1,0 +1,65 @@
+#include "core/error.h"
+#include "io/camera_file.h"
+#include "io/class_table_file.h"
+#include "io/layouts.h"
+#include "io/layouts/file_names.h"
+#include "io/trajectory_file.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+bool recognises(const fs::path& path) {
+  return fs::exists(path / "traj.txt") && has_numbered_file(path / "results", "depth", {".png"});
+}
+
+SequenceListing list(const fs::path& path, const SequenceOptions& options) {
+  SequenceListing listing;
+  listing.depth_scale = 6553.5;
+  const auto depth = numbered_files(path / "results", "depth", {".png"}),
+             color = numbered_files(path / "results", "frame", {".jpg", ".png"}),
+             semantic = numbered_files(path / "semantic", "semantic", {".png"}),
+             instance = numbered_files(path / "instance", "instance", {".png"});
+  const std::vector<StampedPose> poses = read_trajectory(path / "traj.txt", false);
+  const auto at = [](const std::map<int64_t, fs::path>& files, int64_t number) {
+    const auto found = files.find(number);
+    return found == files.end() ? fs::path() : found->second;
+  };
+  // Line n of traj.txt belongs to frame n, so a frame without images shows as a missing one.
+  const int64_t count = std::max(int64_t(poses.size()), depth.empty() ? 0 : depth.rbegin()->first + 1);
+  if (count > int64_t(poses.size() + depth.size()) + 1000000)
+    throw FormatError(
+        describe_mismatch(path.string(), "frame numbers", "numbers near those of traj.txt", std::to_string(count - 1)));
+  for (int64_t number = 0; number < count; ++number) {
+    FrameRecord frame;
+    frame.index = number;
+    frame.stamp_s = double(number);
+    frame.depth.path = at(depth, number);
+    frame.color.path = at(color, number);
+    frame.labels.path = at(semantic, number);
+    frame.instances.path = at(instance, number);
+    if (number < int64_t(poses.size())) frame.pose = poses[size_t(number)].matrix;
+    listing.frames.push_back(std::move(frame));
+  }
+  const fs::path camera = first_existing(path, {"cam_params.json"}).empty()
+                              ? first_existing(path.parent_path(), {"cam_params.json"})
+                              : path / "cam_params.json";
+  if (!camera.empty()) {
+    const CameraFile file = read_camera_file(camera);
+    listing.intrinsics = file.intrinsics;
+    listing.width = file.width, listing.height = file.height;
+    if (file.depth_scale > 0) listing.depth_scale = file.depth_scale;
+  } else if (!options.intrinsics) {
+    listing.intrinsics = Intrinsics{600, 600, 599.5, 339.5};
+    listing.notes.push_back("no cam_params.json: the camera of Replica (600, 600, 599.5, 339.5) is assumed");
+  }
+  if (const fs::path table = first_existing(path, {"classes.yaml", "classes_semantic.csv"}); !table.empty())
+    listing.classes = read_class_table(table);
+  return listing;
+}
+
+}  // namespace
+
+const Layout kReplicaLayout = {"replica", "traj.txt and results/depthNNNNNN.png", recognises, list};
+
+}  // namespace felt

@@ -1,0 +1,85 @@
+#include <set>
+
+#include "core/error.h"
+#include "io/camera_file.h"
+#include "io/layouts.h"
+#include "io/layouts/file_names.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+const std::vector<std::string> kColor = {".color.png", ".color.jpg", ".color.jpeg"}, kDepth = {".depth.png"},
+                               kPose = {".pose.txt"}, kLabels = {".segm.png", ".label.png"};
+constexpr const char* kPrefix = "frame-";
+
+/// The folder that holds the frames: `path` or its only `seq-*`.
+fs::path frame_folder(const fs::path& path) {
+  if (has_numbered_file(path, kPrefix, kDepth)) return path;
+  std::vector<fs::path> sequences;
+  std::error_code fault;
+  for (fs::directory_iterator at(path, fault), end; !fault && at != end; at.increment(fault))
+    if (at->path().filename().string().starts_with("seq-") && has_numbered_file(at->path(), kPrefix, kDepth))
+      sequences.push_back(at->path());
+  if (sequences.size() > 1)
+    throw FormatError(describe_mismatch(path.string(), "sequence", "one folder seq-*; name the one to read",
+                                        std::to_string(sequences.size()) + " of them"));
+  return sequences.empty() ? fs::path() : sequences.front();
+}
+
+bool recognises(const fs::path& path) {
+  const fs::path folder = frame_folder(path);
+  return !folder.empty() && !fs::exists(folder / "cam.info.txt");  // poses in one file: another layout
+}
+
+SequenceListing list(const fs::path& path, const SequenceOptions& options) {
+  SequenceListing listing;
+  const fs::path folder = frame_folder(path);
+  const auto depth = numbered_files(folder, kPrefix, kDepth), color = numbered_files(folder, kPrefix, kColor),
+             pose = numbered_files(folder, kPrefix, kPose), labels = numbered_files(folder, kPrefix, kLabels);
+  std::set<int64_t> numbers;
+  for (const auto* files : {&depth, &color, &pose})
+    for (const auto& [number, file] : *files) numbers.insert(number);
+  const auto at = [](const std::map<int64_t, fs::path>& files, int64_t number) {
+    const auto found = files.find(number);
+    return found == files.end() ? fs::path() : found->second;
+  };
+  for (const int64_t number : numbers) {
+    FrameRecord frame;
+    frame.index = number;
+    frame.stamp_s = double(number);
+    frame.depth.path = at(depth, number);
+    frame.color.path = at(color, number);
+    frame.labels.path = at(labels, number);
+    frame.pose_file = at(pose, number);
+    listing.frames.push_back(std::move(frame));
+  }
+  const fs::path above = folder.parent_path();
+  fs::path camera;
+  for (const fs::path& place : {folder, above}) {
+    if (camera.empty()) camera = first_existing(place, {"camera-intrinsics.txt", "camera-intrinsics.color.txt"});
+  }
+  if (!options.intrinsics) {
+    if (!camera.empty()) {
+      listing.intrinsics = read_camera_file(camera).intrinsics;
+    } else {
+      listing.intrinsics = Intrinsics{585, 585, 320, 240};
+      listing.notes.push_back("no camera-intrinsics.txt: the depth camera of 7-Scenes (585, 585, 320, 240) is assumed");
+    }
+  }
+  // The picking challenge's recordings share these names but rotate the depth bits and count 0.1 mm.
+  if (camera.filename() == "camera-intrinsics.color.txt") {
+    listing.depth_encoding = DepthEncoding::rotated3;
+    listing.depth_scale = 10000;
+    listing.notes.push_back(
+        "camera-intrinsics.color.txt marks a picking-challenge recording: depth is read as rotated3, 0.1 mm");
+  }
+  return listing;
+}
+
+}  // namespace
+
+const Layout kSevenScenesLayout = {"7scenes", "frame-NNNNNN.depth.png with .pose.txt, here or in seq-*/", recognises,
+                                   list};
+
+}  // namespace felt

@@ -1,0 +1,278 @@
+#include "io/listed_sequence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+#include "core/error.h"
+#include "core/pose.h"
+#include "io/camera_file.h"
+#include "io/image_decode.h"
+#include "io/registration.h"
+#include "io/text_input.h"
+#include "io/trajectory_file.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr size_t kImageFileLimitBytes = size_t(1) << 28;
+
+/// Thrown within `read` only: the frame becomes a SkippedFrame.
+struct Skip {
+  std::string reason, detail;
+};
+
+std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
+std::string read_source(const ImageSource& source, const std::string& kind) {
+  std::error_code fault;
+  if (source.empty() || !fs::exists(source.path, fault))
+    throw Skip{"missing " + kind + " image", source.empty() ? "no file" : source.path.string()};
+  if (source.bytes == 0) {
+    try {
+      return read_whole_file(source.path, kImageFileLimitBytes);
+    } catch (const Error& problem) {
+      throw Skip{"unreadable " + kind + " image", problem.what()};
+    }
+  }
+  std::ifstream file(source.path, std::ios::binary);
+  std::string bytes(source.bytes, '\0');
+  if (!file.seekg(std::streamoff(source.offset)) || !file.read(bytes.data(), std::streamsize(bytes.size())))
+    throw Skip{"truncated " + kind + " image", source.path.string() + " at byte " + std::to_string(source.offset)};
+  return bytes;
+}
+
+std::span<const uint8_t> as_bytes(const std::string& text) {
+  return {reinterpret_cast<const uint8_t*>(text.data()), text.size()};
+}
+
+/// Runs a decoder and turns its complaint into a reason to skip the frame.
+template <typename Decode>
+auto decoded(const ImageSource& source, const std::string& kind, Decode decode) {
+  const std::string bytes = read_source(source, kind);
+  try {
+    return decode(as_bytes(bytes), source.path.string());
+  } catch (const ImageError& fault) {
+    throw Skip{fault.reason() + " " + kind + " image", fault.what()};
+  }
+}
+
+class ListedSequence final : public SequenceReader {
+public:
+  ListedSequence(const fs::path& path, const SequenceOptions& options, SequenceListing listing);
+
+  const SequenceInfo& info() const override { return info_; }
+  int64_t size() const override { return int64_t(listing_.frames.size()); }
+  ReadResult read(int64_t i) const override;
+
+private:
+  void find_camera(const fs::path& path);
+  Eigen::Isometry3d read_pose(const FrameRecord& frame) const;
+  DepthImage read_depth(const ImageSource& source) const;
+  ColorImage read_color(const ImageSource& source, const DepthImage& depth_m) const;
+  Image<uint16_t> read_ids(const ImageSource& source, const std::string& kind, const DepthImage& depth_m) const;
+  ProbabilityImage read_probabilities(const ImageSource& source) const;
+  PinholeCamera camera_of_color_grid(int width, int height) const;
+  bool on_depth_grid(int width, int height) const;
+
+  SequenceListing listing_;
+  SequenceInfo info_;
+  bool with_color_;
+  Image<float> z_per_ray_length_;  ///< empty where depth lies along the optical axis
+};
+
+ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& options, SequenceListing listing)
+    : listing_(std::move(listing)) {
+  info_.layout = listing_.layout;
+  info_.path = path;
+  info_.depth_scale = listing_.depth_scale;
+  info_.pose_convention = to_string(listing_.pose_convention);
+  info_.classes = listing_.classes;
+  info_.notes = listing_.notes;
+  info_.recorded_frames = int64_t(listing_.frames.size());
+  find_camera(path);
+
+  std::vector<FrameRecord> selected;
+  for (const int64_t i : selected_positions(options.frames, info_.recorded_frames))
+    selected.push_back(std::move(listing_.frames[size_t(i)]));
+  listing_.frames = std::move(selected);
+  if (listing_.frames.empty())
+    throw ConfigError(describe_mismatch("frames " + to_string(options.frames), "selection",
+                                        "some of the " + std::to_string(info_.recorded_frames) + " frames", "none"));
+  const auto any = [&](auto test) { return std::any_of(listing_.frames.begin(), listing_.frames.end(), test); };
+  with_color_ = options.read_color && any([](const FrameRecord& f) { return !f.color.empty(); });
+  info_.has_color = with_color_;
+  info_.has_labels = any([](const FrameRecord& f) { return !f.labels.empty(); });
+  info_.has_probabilities = any([](const FrameRecord& f) { return !f.probabilities.empty(); });
+  info_.has_instances = any([](const FrameRecord& f) { return !f.instances.empty(); });
+
+  if (listing_.depth_is_ray_length) {
+    z_per_ray_length_ = Image<float>(info_.camera.width, info_.camera.height);
+    for (int v = 0; v < info_.camera.height; ++v)
+      for (int u = 0; u < info_.camera.width; ++u) z_per_ray_length_(u, v) = float(1 / info_.camera.ray(u, v).norm());
+  }
+}
+
+void ListedSequence::find_camera(const fs::path& path) {
+  // The first depth image that can be read tells the size of all.
+  std::string last_fault = "no depth image";
+  int width = 0, height = 0;
+  for (const FrameRecord& frame : listing_.frames) {
+    if (width > 0) break;
+    if (frame.depth.empty()) continue;
+    if (frame.depth.codec != ImageSource::Codec::image_file) {
+      width = listing_.width, height = listing_.height;
+      break;
+    }
+    try {
+      const std::string bytes = read_source(frame.depth, "depth");
+      const ImageHeader header = read_image_header(as_bytes(bytes), frame.depth.path.string());
+      width = header.width, height = header.height;
+    } catch (const Skip& skip) {
+      last_fault = skip.detail;
+    } catch (const ImageError& fault) {
+      last_fault = fault.what();
+    }
+  }
+  if (width == 0)
+    throw FormatError(describe_mismatch(path.string(), "depth images", "at least one that can be read", last_fault));
+  if (listing_.width > 0 && (listing_.width != width || listing_.height != height))
+    throw FormatError(describe_mismatch(path.string(), "image size",
+                                        size_text(listing_.width, listing_.height) + " as the camera says",
+                                        size_text(width, height) + " in the first depth image"));
+  const Intrinsics k = listing_.intrinsics.value_or(Intrinsics{});
+  info_.camera = {k.fx, k.fy, k.cx, k.cy, width, height};
+  check_camera_fits_image(info_.camera, path.string());
+}
+
+ReadResult ListedSequence::read(int64_t i) const {
+  const FrameRecord& record = listing_.frames[size_t(i)];
+  if (!record.fault.empty()) return SkippedFrame{record.index, record.fault, record.fault_detail};
+  try {
+    Frame frame;
+    frame.index = record.index;
+    frame.stamp_s = record.stamp_s;
+    frame.camera = info_.camera;
+    frame.T_world_camera = read_pose(record);
+    frame.depth_m = read_depth(record.depth);
+    if (with_color_) frame.color = read_color(record.color, frame.depth_m);
+    if (!record.labels.empty()) frame.labels = read_ids(record.labels, "label", frame.depth_m);
+    if (!record.instances.empty()) frame.instances = read_ids(record.instances, "instance", frame.depth_m);
+    if (!record.probabilities.empty()) frame.probabilities = read_probabilities(record.probabilities);
+    return frame;
+  } catch (const Skip& skip) {
+    return SkippedFrame{record.index, skip.reason, "frame " + std::to_string(record.index) + ": " + skip.detail};
+  }
+}
+
+Eigen::Isometry3d ListedSequence::read_pose(const FrameRecord& frame) const {
+  Eigen::Matrix4d recorded;
+  std::string where = "trajectory";
+  if (frame.pose) {
+    recorded = *frame.pose;
+  } else if (std::error_code fault; frame.pose_file.empty() || !fs::exists(frame.pose_file, fault)) {
+    throw Skip{"missing pose", "no pose recorded"};
+  } else {
+    where = frame.pose_file.string();
+    try {
+      recorded = read_pose_file(frame.pose_file);
+    } catch (const Error& problem) {
+      throw Skip{"unreadable pose", problem.what()};
+    }
+  }
+  Eigen::Isometry3d T;
+  switch (rigid_pose(recorded, T)) {
+    case PoseFault::not_finite:
+      throw Skip{"non-finite pose", where};
+    case PoseFault::not_rigid:
+      throw Skip{"non-rigid pose", where};
+    case PoseFault::none:
+      break;
+  }
+  if (listing_.pose_convention.world_to_camera) T = T.inverse();
+  if (listing_.pose_convention.opengl_axes) T.linear() = T.linear() * Eigen::Vector3d(1, -1, -1).asDiagonal();
+  return T;
+}
+
+DepthImage ListedSequence::read_depth(const ImageSource& source) const {
+  const Image<uint16_t> raw = decoded(source, "depth", decode_gray16);
+  if (raw.width() != info_.camera.width || raw.height() != info_.camera.height)
+    throw Skip{"wrong-size depth image",
+               describe_mismatch(source.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
+                                 size_text(raw.width(), raw.height()))};
+  DepthImage depth_m(raw.width(), raw.height());
+  const bool rotated = listing_.depth_encoding == DepthEncoding::rotated3;
+  const float scale = float(listing_.depth_scale);
+  uint32_t any = 0;
+  for (size_t p = 0; p < raw.size(); ++p) {
+    const uint16_t stored = raw.data()[p], value = rotated ? uint16_t(stored >> 3 | stored << 13) : stored;
+    const bool valid = value != 0 && value != 0xffff;
+    any |= valid;
+    depth_m.data()[p] = valid ? float(value) / scale : 0.0f;
+  }
+  if (!any) throw Skip{"depth all zero", source.path.string()};
+  for (size_t p = 0; p < z_per_ray_length_.size(); ++p) depth_m.data()[p] *= z_per_ray_length_.data()[p];
+  return depth_m;
+}
+
+bool ListedSequence::on_depth_grid(int width, int height) const {
+  return width == info_.camera.width && height == info_.camera.height && !listing_.color_intrinsics &&
+         listing_.T_color_depth.isIdentity(0);
+}
+
+PinholeCamera ListedSequence::camera_of_color_grid(int width, int height) const {
+  if (!listing_.color_intrinsics) return resized(info_.camera, width, height);
+  const Intrinsics& k = *listing_.color_intrinsics;
+  return {k.fx, k.fy, k.cx, k.cy, width, height};
+}
+
+ColorImage ListedSequence::read_color(const ImageSource& source, const DepthImage& depth_m) const {
+  ColorImage image = decoded(source, "colour", decode_color);
+  if (on_depth_grid(image.width(), image.height())) return image;
+  return registered_to_depth(image, camera_of_color_grid(image.width(), image.height()), depth_m, info_.camera,
+                             listing_.T_color_depth, Rgba8{0, 0, 0, 0});
+}
+
+Image<uint16_t> ListedSequence::read_ids(const ImageSource& source, const std::string& kind,
+                                         const DepthImage& depth_m) const {
+  Image<uint16_t> image = decoded(source, kind, decode_gray16);
+  if (image.width() == info_.camera.width && image.height() == info_.camera.height) return image;
+  // Networks label the colour image: another size is right where it has the colour image's shape.
+  const double shape = double(image.width()) * info_.camera.height / (double(image.height()) * info_.camera.width);
+  if (!listing_.color_intrinsics && std::abs(shape - 1) > 0.02)
+    throw Skip{"wrong-size " + kind + " image",
+               describe_mismatch(source.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
+                                 size_text(image.width(), image.height()))};
+  return registered_to_depth<uint16_t>(image, camera_of_color_grid(image.width(), image.height()), depth_m,
+                                       info_.camera, listing_.T_color_depth, kNoLabel);
+}
+
+ProbabilityImage ListedSequence::read_probabilities(const ImageSource& source) const {
+  const Image<uint16_t> stack = decoded(source, "probability", decode_gray16);
+  const int width = info_.camera.width, height = info_.camera.height, planes = stack.height() / height;
+  if (stack.width() != width || stack.height() % (2 * height) != 0)
+    throw Skip{
+        "wrong-size probability image",
+        describe_mismatch(source.path.string(), "size", std::to_string(width) + " x 2 m " + std::to_string(height),
+                          size_text(stack.width(), stack.height()))};
+  ProbabilityImage image{width, height, planes / 2, {}, {}};
+  const size_t pixels = size_t(width) * height, top = size_t(image.top);
+  image.class_id.resize(pixels * top);
+  image.probability.resize(pixels * top);
+  for (size_t m = 0; m < top; ++m)
+    for (size_t p = 0; p < pixels; ++p) {
+      image.class_id[p * top + m] = stack.data()[m * pixels + p];
+      image.probability[p * top + m] = float(stack.data()[(top + m) * pixels + p]) / 65535.0f;
+    }
+  return image;
+}
+
+}  // namespace
+
+std::unique_ptr<SequenceReader> make_listed_sequence(const fs::path& path, const SequenceOptions& options,
+                                                     SequenceListing listing) {
+  return std::make_unique<ListedSequence>(path, options, std::move(listing));
+}
+
+}  // namespace felt

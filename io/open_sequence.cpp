@@ -1,0 +1,79 @@
+#include "io/open_sequence.h"
+
+#include "core/error.h"
+#include "io/class_table_file.h"
+#include "io/layouts.h"
+#include "io/listed_sequence.h"
+#include "io/side_images.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+const Layout& layout_named(const std::string& name) {
+  std::string names;
+  for (const Layout& layout : all_layouts()) {
+    if (name == layout.name) return layout;
+    names += (names.empty() ? "" : ", ") + std::string(layout.name);
+  }
+  throw ConfigError(describe_mismatch("--format", "layout", "one of " + names, "'" + name + "'"));
+}
+
+const Layout& detect_layout(const fs::path& path) {
+  std::string looked_for;
+  for (const Layout& layout : all_layouts()) {
+    if (layout.recognises(path)) return layout;
+    looked_for += std::string(looked_for.empty() ? "" : "; ") + layout.name + ": " + layout.looks_for;
+  }
+  throw FormatError(describe_mismatch(path.string(), "sequence", looked_for, "none of these"));
+}
+
+SequenceListing list_sequence(const fs::path& path, const SequenceOptions& options) {
+  std::error_code fault;
+  if (!fs::exists(path, fault))
+    throw IoError(describe_mismatch(path.string(), "sequence", "a folder or file", "nothing"));
+  if (fs::is_directory(path)) {
+    fs::directory_iterator(path, fault);
+    if (fault) throw IoError(describe_mismatch(path.string(), "sequence", "a readable folder", fault.message()));
+  }
+  const Layout& layout = options.format.empty() ? detect_layout(path) : layout_named(options.format);
+  SequenceListing listing = layout.list(path, options);
+  listing.layout = layout.name;
+  if (listing.frames.empty())
+    throw FormatError(
+        describe_mismatch(path.string(), std::string(layout.name) + " sequence", layout.looks_for, "no frames"));
+  return listing;
+}
+
+void apply_options(const SequenceOptions& options, SequenceListing& listing) {
+  if (options.intrinsics) listing.intrinsics = options.intrinsics;
+  if (options.depth_scale) listing.depth_scale = *options.depth_scale;
+  if (options.depth_encoding) listing.depth_encoding = *options.depth_encoding;
+  if (options.depth_is_ray_length) listing.depth_is_ray_length = *options.depth_is_ray_length;
+  if (options.pose_convention) listing.pose_convention = *options.pose_convention;
+  if (!(listing.depth_scale > 0 && listing.depth_scale < 1e9))
+    throw ConfigError(
+        describe_mismatch("depth scale", "units per metre", "a number above 0", std::to_string(listing.depth_scale)));
+  if (!options.classes_file.empty()) listing.classes = read_class_table(options.classes_file);
+  if (!options.labels_dir.empty()) attach_labels(options.labels_dir, listing);
+  if (!options.probs_dir.empty()) attach_probabilities(options.probs_dir, listing);
+}
+
+}  // namespace
+
+std::span<const Layout> all_layouts() {
+  static const Layout layouts[] = {kGenericLayout, kTumLayout, kReplicaLayout, kSevenScenesLayout};
+  return layouts;
+}
+
+std::unique_ptr<SequenceReader> open_sequence(const fs::path& path, const SequenceOptions& options) {
+  try {
+    SequenceListing listing = list_sequence(path, options);
+    apply_options(options, listing);
+    return make_listed_sequence(path, options, std::move(listing));
+  } catch (const fs::filesystem_error& fault) {
+    throw IoError(fault.path1().string() + ": " + fault.code().message());
+  }
+}
+
+}  // namespace felt

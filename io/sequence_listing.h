@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/class_table.h"
+#include "io/sequence_options.h"
+
+namespace felt {
+
+/// Where one image lies: a whole file, or `bytes` at `offset` of a container.
+struct ImageSource {
+  enum class Codec { image_file, zlib_u16, raw_u16 };
+  std::filesystem::path path;
+  uint64_t offset = 0;
+  uint64_t bytes = 0;  ///< 0: the whole file
+  Codec codec = Codec::image_file;
+  bool empty() const { return path.empty(); }
+};
+
+/// One frame as the layout found it: names and a pose, nothing decoded.
+struct FrameRecord {
+  int64_t index = 0;   ///< frame number
+  double stamp_s = 0;  ///< or the index where none is recorded
+  ImageSource depth, color, labels, instances;
+  ImageSource probabilities;                                 ///< stacked top-m image (io/layouts.h)
+  std::vector<std::pair<uint16_t, ImageSource>> class_maps;  ///< one probability image per class id
+  std::optional<Eigen::Matrix4d> pose;                       ///< as recorded; absent: read from `pose_file`
+  std::filesystem::path pose_file;                           ///< empty and no `pose`: the frame has none
+  std::string fault, fault_detail;                           ///< why the layout already knows that it cannot be used
+};
+
+/// A sequence as plain data: what every layout produces and one reader decodes.
+struct SequenceListing {
+  std::string layout;
+  std::vector<FrameRecord> frames;             ///< in recorded order
+  std::optional<Intrinsics> intrinsics;        ///< of the depth images
+  int width = 0, height = 0;                   ///< of the depth images; 0: from the first one that can be read
+  std::optional<Intrinsics> color_intrinsics;  ///< where colour is not on the depth images' grid
+  Eigen::Matrix4d T_color_depth = Eigen::Matrix4d::Identity();
+  double depth_scale = 1000;
+  DepthEncoding depth_encoding = DepthEncoding::plain;
+  bool depth_is_ray_length = false;
+  PoseConvention pose_convention;
+  ClassTable classes;
+  std::vector<std::string> notes;
+};
+
+}  // namespace felt

@@ -1,0 +1,101 @@
+#include "io/text_input.h"
+
+#include <charconv>
+#include <cstdio>
+#include <memory>
+
+#include "core/error.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+
+std::string read_whole_file(const fs::path& path, size_t limit_bytes) {
+  std::error_code fault;
+  const fs::file_status status = fs::status(path, fault);
+  if (!fs::exists(status)) throw IoError(describe_mismatch(path.string(), "file", "a file", "nothing"));
+  if (!fs::is_regular_file(status))
+    throw IoError(describe_mismatch(path.string(), "file", "a regular file", "a folder or device"));
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
+  if (!file) throw IoError(describe_mismatch(path.string(), "file", "a readable file", "no permission to open it"));
+  const uintmax_t size = fs::file_size(path, fault);
+  if (fault) throw IoError(path.string() + ": size: " + fault.message());
+  if (size > limit_bytes)
+    throw FormatError(describe_mismatch(path.string(), "size", "at most " + std::to_string(limit_bytes) + " bytes",
+                                        std::to_string(size)));
+  std::string content(size, '\0');
+  content.resize(std::fread(content.data(), 1, content.size(), file.get()));
+  if (std::ferror(file.get())) throw IoError(path.string() + ": reading failed");
+  return content;
+}
+
+LineReader::LineReader(std::string_view text, const fs::path& path) : rest_(text), path_(path) {
+  if (rest_.starts_with("\xef\xbb\xbf")) rest_.remove_prefix(3);
+  if (rest_.substr(0, 4096).find('\0') != std::string_view::npos)
+    throw FormatError(describe_mismatch(path.string(), "content", "text", "binary data"));
+}
+
+bool LineReader::next(bool comments) {
+  while (!rest_.empty()) {
+    const size_t end = rest_.find('\n');
+    line_ = rest_.substr(0, end);
+    rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+    ++number_;
+    while (!line_.empty() && (line_.back() == '\r' || line_.back() == ' ' || line_.back() == '\t'))
+      line_.remove_suffix(1);
+    const size_t first = line_.find_first_not_of(" \t");
+    if (first == std::string_view::npos || (comments && line_[first] == '#')) continue;
+    return true;
+  }
+  return false;
+}
+
+std::string LineReader::where() const { return path_.string() + ":" + std::to_string(number_); }
+
+std::vector<std::string_view> split_words(std::string_view line, char separator) {
+  std::vector<std::string_view> words;
+  const char delimiters[] = {' ', '\t', '\r', separator, '\0'};
+  for (size_t at = line.find_first_not_of(delimiters); at != std::string_view::npos;) {
+    const size_t end = std::min(line.find_first_of(delimiters, at), line.size());
+    words.push_back(line.substr(at, end - at));
+    at = line.find_first_not_of(delimiters, end);
+  }
+  return words;
+}
+
+std::optional<double> parse_number(std::string_view word) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  double value = 0;
+  const auto [end, fault] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (end != word.data() + word.size() || word.empty()) return std::nullopt;
+  if (fault == std::errc::result_out_of_range) {
+    // 1e-400 is a zero to us; 1e400 is no usable number.
+    return word.find("e-") != std::string_view::npos || word.find("E-") != std::string_view::npos
+               ? std::optional<double>(0.0)
+               : std::nullopt;
+  }
+  return fault == std::errc() ? std::optional<double>(value) : std::nullopt;
+}
+
+std::optional<int64_t> parse_integer(std::string_view word) {
+  int64_t value = 0;
+  const auto [end, fault] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return fault == std::errc() && end == word.data() + word.size() ? std::optional<int64_t>(value) : std::nullopt;
+}
+
+std::vector<double> parse_numbers(std::string_view line, const std::string& where) {
+  std::vector<double> numbers;
+  for (const std::string_view word : split_words(line)) {
+    const std::optional<double> number = parse_number(word);
+    if (!number) {
+      const bool comma = word.find(',') != std::string_view::npos;
+      throw FormatError(
+          describe_mismatch(where, "number " + std::to_string(numbers.size() + 1),
+                            comma ? "a number with '.' as decimal sign and blanks between numbers" : "a number",
+                            "'" + std::string(word.substr(0, 40)) + "'"));
+    }
+    numbers.push_back(*number);
+  }
+  return numbers;
+}
+
+}  // namespace felt

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace felt {
+
+/// Whole content of a file. Throws IoError where it cannot be read or is no regular file, FormatError where it is
+/// larger than `limit_bytes`.
+std::string read_whole_file(const std::filesystem::path& path, size_t limit_bytes = size_t(1) << 30);
+
+/// Walks the lines of a text: a byte order mark and Windows line ends are dropped, lines are counted from 1.
+class LineReader {
+public:
+  /// `text` must outlive the reader. Throws FormatError where the text is binary (a NUL in its first 4096 bytes).
+  LineReader(std::string_view text, const std::filesystem::path& path);
+  /// Moves to the next line that is neither blank nor, where `comments`, begins with '#'. False at the end.
+  bool next(bool comments = true);
+  std::string_view line() const { return line_; }
+  int64_t number() const { return number_; }
+  /// "<path>:<line>"
+  std::string where() const;
+
+private:
+  std::string_view rest_, line_;
+  std::filesystem::path path_;
+  int64_t number_ = 0;
+};
+
+/// Words of a line separated by blanks, tabs or, where given, by one further character.
+std::vector<std::string_view> split_words(std::string_view line, char separator = ' ');
+
+/// A number with '.' as decimal sign; reads "nan", "inf" and "-inf" as such. Nothing where the word is anything else.
+std::optional<double> parse_number(std::string_view word);
+std::optional<int64_t> parse_integer(std::string_view word);
+
+/// All numbers of a line. Throws FormatError naming `where` and the faulty word; says so where a decimal comma is the
+/// likely cause.
+std::vector<double> parse_numbers(std::string_view line, const std::string& where);
+
+}  // namespace felt
