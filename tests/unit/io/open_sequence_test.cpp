@@ -1,7 +1,7 @@
 #include "io/open_sequence.h"
 
 #include <catch2/catch.hpp>
-#include <chrono>
+#include <ctime>
 #include <fstream>
 
 #include "core/error.h"
@@ -400,9 +400,9 @@ TEST_CASE("a hundred thousand poses open within seconds") {
   const std::string pose = matrix_text(pose_at(1).matrix(), " ");
   for (int i = 0; i < 100000; ++i) poses += std::to_string(i) + " " + pose + "\n";
   write_text(folder.path() / "poses.txt", poses);
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();  // processor time: other programs do not count
   const auto reader = open_sequence(folder.path());
-  CHECK(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() < 5);
+  CHECK(double(std::clock() - start) / CLOCKS_PER_SEC < 5);
   CHECK(reader->size() == 100000);
   CHECK(skip_of(*reader, 99999).reason == "missing depth image");
 }
