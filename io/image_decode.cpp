@@ -5,7 +5,8 @@
 
 #include <cstring>
 #include <memory>
-#include <string_view>
+
+#include "io/png_decode.h"
 
 namespace felt {
 namespace {
@@ -39,11 +40,18 @@ ImageHeader png_header(std::span<const uint8_t> file, const std::string& where) 
   const uint32_t width = big_endian_32(&file[16]), height = big_endian_32(&file[20]);
   const int bits = file[24], color_type = file[25];
   constexpr int kChannels[7] = {1, 0, 3, 1, 2, 0, 4};
-  if (width == 0 || height == 0 || width > 0x7fffffff || height > 0x7fffffff || color_type > 6 ||
-      kChannels[color_type] == 0)
-    throw ImageError("unreadable", describe_mismatch(where, "PNG header", "a valid size and colour type",
-                                                     std::to_string(width) + " x " + std::to_string(height) +
-                                                         ", colour type " + std::to_string(color_type)));
+  // Bit i of an entry: the colour type allows depths of 2^i bits.
+  constexpr int kDepths[7] = {0b11111, 0, 0b11000, 0b01111, 0b11000, 0, 0b11000};
+  const auto has_depth = [&] {
+    for (int i = 0; i < 5; ++i)
+      if (bits == 1 << i && (kDepths[color_type] >> i & 1) != 0) return true;
+    return false;
+  };
+  if (width == 0 || height == 0 || width > 0x7fffffff || height > 0x7fffffff || color_type > 6 || !has_depth())
+    throw ImageError("unreadable",
+                     describe_mismatch(where, "PNG header", "a valid size, depth and colour type",
+                                       std::to_string(width) + " x " + std::to_string(height) + ", " +
+                                           std::to_string(bits) + " bits, colour type " + std::to_string(color_type)));
   return {ImageFormat::png, int(width), int(height), kChannels[color_type], bits};
 }
 
@@ -121,6 +129,27 @@ ColorImage jpeg_decode(std::span<const uint8_t> file, const ImageHeader& header,
   return image;
 }
 
+size_t row_bytes(const ImageHeader& header) { return (size_t(header.width) * header.channels * header.bits + 7) / 8; }
+
+/// One to eight bits a pixel, the first one in the highest bits of a byte.
+void unpack_bits(const uint8_t* stored, const ImageHeader& header, uint16_t* pixels) {
+  const int per_byte = 8 / header.bits, mask = (1 << header.bits) - 1;
+  for (int u = 0; u < header.width; ++u)
+    pixels[u] = stored[u / per_byte] >> (8 - header.bits * (u % per_byte + 1)) & mask;
+}
+
+/// A one-channel PNG of any kind, interlaced ones too.
+Image<uint16_t> gray_of_spng(std::span<const uint8_t> file, const ImageHeader& header, const std::string& where) {
+  const std::vector<uint8_t> raw = spng_decode(file, SPNG_FMT_PNG, where);
+  Image<uint16_t> image(header.width, header.height);
+  if (header.bits == 16)
+    std::memcpy(image.data(), raw.data(), image.size() * 2);
+  else
+    for (int v = 0; v < header.height; ++v)
+      unpack_bits(raw.data() + size_t(v) * raw.size() / header.height, header, image.row(v));
+  return image;
+}
+
 }  // namespace
 
 ImageHeader read_image_header(std::span<const uint8_t> file, const std::string& where) {
@@ -145,18 +174,18 @@ Image<uint16_t> decode_gray16(std::span<const uint8_t> file, const std::string& 
   if (header.format != ImageFormat::png || header.channels != 1)
     throw wrong_type(where, "a PNG with one channel", header);
   check_size_is_plausible(header, file, where);
-  const std::vector<uint8_t> raw = spng_decode(file, SPNG_FMT_PNG, where);
+  if (!has_plain_rows(file)) return gray_of_spng(file, header, where);
+
+  thread_local std::vector<uint8_t> buffer;
+  const PngRows rows = decode_png_rows(file, header.height, row_bytes(header), 1 + (header.bits == 16), buffer, where);
   Image<uint16_t> image(header.width, header.height);
-  const size_t row_bytes = raw.size() / header.height;
-  if (header.bits == 16) {
-    std::memcpy(image.data(), raw.data(), image.size() * 2);
-    return image;
+  for (int v = 0; v < header.height; ++v) {
+    const uint8_t* const stored = rows.data + size_t(v) * rows.stride;
+    if (header.bits == 16)
+      for (int u = 0; u < header.width; ++u) image.row(v)[u] = uint16_t(stored[2 * u] << 8 | stored[2 * u + 1]);
+    else
+      unpack_bits(stored, header, image.row(v));
   }
-  // One to eight bits a pixel, the first one in the highest bits of a byte.
-  const int per_byte = 8 / header.bits, mask = (1 << header.bits) - 1;
-  for (int v = 0; v < header.height; ++v)
-    for (int u = 0; u < header.width; ++u)
-      image(u, v) = raw[v * row_bytes + u / per_byte] >> (8 - header.bits * (u % per_byte + 1)) & mask;
   return image;
 }
 
@@ -164,10 +193,20 @@ ColorImage decode_color(std::span<const uint8_t> file, const std::string& where)
   const ImageHeader header = read_image_header(file, where);
   check_size_is_plausible(header, file, where);
   if (header.format == ImageFormat::jpeg) return jpeg_decode(file, header, where);
-  const std::vector<uint8_t> raw = spng_decode(file, SPNG_FMT_RGBA8, where);
   ColorImage image(header.width, header.height);
-  std::memcpy(static_cast<void*>(image.data()), raw.data(), raw.size());
-  for (Rgba8& pixel : image) pixel.a = 255;
+  if (header.bits != 8 || header.channels < 3 || !has_plain_rows(file)) {
+    const std::vector<uint8_t> raw = spng_decode(file, SPNG_FMT_RGBA8, where);
+    std::memcpy(static_cast<void*>(image.data()), raw.data(), raw.size());
+    for (Rgba8& pixel : image) pixel.a = 255;
+    return image;
+  }
+  thread_local std::vector<uint8_t> buffer;
+  const PngRows rows = decode_png_rows(file, header.height, row_bytes(header), header.channels, buffer, where);
+  for (int v = 0; v < header.height; ++v) {
+    const uint8_t* stored = rows.data + size_t(v) * rows.stride;
+    for (int u = 0; u < header.width; ++u, stored += header.channels)
+      image.row(v)[u] = {stored[0], stored[1], stored[2], 255};
+  }
   return image;
 }
 

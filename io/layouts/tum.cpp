@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 
 #include "core/error.h"
 #include "io/camera_file.h"
@@ -57,6 +59,9 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   std::vector<double> depth_stamps;
   for (const StampedFile& file : depth) depth_stamps.push_back(file.stamp_s);
   const std::vector<bool> disordered = out_of_order(depth_stamps);
+  std::vector<double> ascending_depth_stamps = depth_stamps;
+  std::erase_if(ascending_depth_stamps, [](double stamp_s) { return std::isnan(stamp_s); });
+  std::sort(ascending_depth_stamps.begin(), ascending_depth_stamps.end());
   const std::vector<double> color_stamps = sort_by_stamp(color), pose_stamps = sort_by_stamp(poses);
 
   const auto stamp_text = [](double stamp_s) {
@@ -81,8 +86,11 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
       frame.pose = poses[size_t(pose)].matrix;
     else
       refuse("missing pose", "no pose" + within);
+    // Colour belongs to one depth image only, the nearest to it: a neighbour's colour would be smeared over this one.
     const int64_t partner = nearest_stamp(color_stamps, frame.stamp_s, options.max_dt_s);
-    if (partner >= 0)
+    const int64_t its_depth =
+        partner < 0 ? -1 : nearest_stamp(ascending_depth_stamps, color_stamps[size_t(partner)], options.max_dt_s);
+    if (its_depth >= 0 && ascending_depth_stamps[size_t(its_depth)] == frame.stamp_s)
       frame.color.path = color[size_t(partner)].path;
     else if (options.read_color && !color.empty())
       refuse("missing colour image", "no colour image" + within);

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace felt {
+
+/// Unfiltered rows of a PNG: row v begins at `data[v * stride]`, values of 16 bits are big-endian.
+struct PngRows {
+  const uint8_t* data = nullptr;
+  size_t stride = 0;
+};
+
+/// True where `decode_png_rows` can decode the file: a PNG that is not interlaced.
+bool has_plain_rows(std::span<const uint8_t> png);
+
+/// Inflates and unfilters a PNG of `height` rows of `row_bytes`, `pixel_bytes` (at least 1) to the pixel, into
+/// `buffer`, which the result points into. Much faster than libpng: libdeflate inflates and checks the sums. Throws
+/// ImageError ("truncated", "unreadable").
+PngRows decode_png_rows(std::span<const uint8_t> png, int height, size_t row_bytes, int pixel_bytes,
+                        std::vector<uint8_t>& buffer, const std::string& where);
+
+}  // namespace felt

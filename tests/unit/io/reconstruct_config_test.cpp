@@ -1,0 +1,82 @@
+#include "io/reconstruct_config.h"
+
+#include <catch2/catch.hpp>
+
+#include "core/error.h"
+#include "tests/support/data.h"
+#include "tests/support/recorded_sequence.h"
+
+using namespace felt;
+using namespace felt::test;
+
+TEST_CASE("a configuration sets what it names and leaves the rest open") {
+  TemporaryDirectory folder;
+  const auto file = folder.path() / "config.yaml";
+  write_text(folder.path() / "classes.yaml", "classes: [{id: 1, name: wall}]\n");
+  write_text(
+      file,
+      "voxel_size: 0.01\ntruncation: 4vox\nmax-depth: 3.5\nframes: 0:100:2\nintrinsics: [525, 525, 319.5, 239.5]\n"
+      "weight: sensor-noise\ncarve: true\nthreads: 2\nclasses: classes.yaml\npose_convention: w2c,opengl\n");
+  const ReconstructConfig config = read_reconstruct_config(file);
+  CHECK(config.voxel_size_m == 0.01);
+  CHECK(parse_truncation(*config.truncation, *config.voxel_size_m, "truncation") == Approx(0.04));
+  CHECK(config.max_depth_m == 3.5);
+  CHECK(config.frames == FrameSelection{0, 100, 2});
+  CHECK(config.intrinsics->cx == 319.5);
+  CHECK(config.weight == WeightModel::sensor_noise);
+  CHECK(config.carve == true);
+  CHECK(config.threads == 2);
+  CHECK(config.classes == folder.path() / "classes.yaml");
+  CHECK(config.pose_convention == PoseConvention{true, true});
+  CHECK(!config.min_depth_m);
+  CHECK(!config.distance);
+  CHECK(!config.depth_scale);
+}
+
+TEST_CASE("every problem of a configuration is reported at once with its line and key") {
+  TemporaryDirectory folder;
+  const auto file = folder.path() / "config.yaml";
+  write_text(
+      file,
+      "voxel_size: 0\nvoxelsize: 1\ntruncation: wide\nmax_depth: [1, 2]\nframes: 5\nweight: heavy\ncarve: maybe\n"
+      "threads: 0\nlabels: nowhere\nmax_dt: 0,02\nmax_depth: 3\nintrinsics: [1, 2]\n");
+  try {
+    read_reconstruct_config(file);
+    FAIL("was accepted");
+  } catch (const ConfigError& fault) {
+    const std::string text = fault.what();
+    INFO(text);
+    for (const char* part :
+         {"config.yaml:1: voxel_size", "config.yaml:2: key: expected 'voxel_size', found 'voxelsize'",
+          "config.yaml:3: truncation", "config.yaml:4: max_depth", "config.yaml:5: frames", "config.yaml:6: weight",
+          "inverse-square", "config.yaml:7: carve", "config.yaml:8: threads", "config.yaml:9: labels",
+          "config.yaml:10: max_dt", "config.yaml:11: key: expected each once", "config.yaml:12: intrinsics"})
+      CHECK_THAT(text, Catch::Contains(part));
+  }
+}
+
+TEST_CASE("a configuration that is no YAML or no table is refused with its line") {
+  TemporaryDirectory folder;
+  const auto file = folder.path() / "config.yaml";
+  write_text(file, "voxel_size: 0.02\nframes: [1, 2\n");
+  CHECK_THROWS_WITH(read_reconstruct_config(file), Catch::Contains("config.yaml:"));
+  write_text(file, "- voxel_size\n");
+  CHECK_THROWS_AS(read_reconstruct_config(file), ConfigError);
+  CHECK_THROWS_AS(read_reconstruct_config(folder.path() / "absent.yaml"), IoError);
+  write_text(file, "");
+  CHECK(!read_reconstruct_config(file).voxel_size_m);
+}
+
+TEST_CASE("the nearest known word is suggested, and none where nothing is near") {
+  CHECK(nearest_word("max_dpeth", {"max_depth", "min_depth", "max_dt"}) == "max_depth");
+  CHECK(nearest_word("voxelsize", {"max_depth", "voxel_size"}) == "voxel_size");
+  CHECK(nearest_word("zzzz", {"max_depth", "voxel_size"}).empty());
+}
+
+TEST_CASE("a truncation is metres or voxels") {
+  CHECK(parse_truncation("0.08", 0.02, "--truncation") == 0.08);
+  CHECK(parse_truncation("0.08m", 0.02, "--truncation") == 0.08);
+  CHECK(parse_truncation("4vox", 0.02, "--truncation") == 0.08);
+  for (const char* text : {"", "vox", "-1", "4 voxels", "nan", "inf", "0"})
+    CHECK_THROWS_AS(parse_truncation(text, 0.02, "--truncation"), ConfigError);
+}
