@@ -189,6 +189,18 @@ Image<uint16_t> decode_gray16(std::span<const uint8_t> file, const std::string& 
   return image;
 }
 
+Image<uint16_t> decode_u16_values(std::span<const uint8_t> bytes, bool compressed, int width, int height,
+                                  const std::string& where) {
+  Image<uint16_t> image(width, height);
+  if (compressed)
+    inflate_zlib(bytes, {reinterpret_cast<uint8_t*>(image.data()), image.size() * 2}, where);
+  else if (bytes.size() == image.size() * 2)
+    std::memcpy(image.data(), bytes.data(), bytes.size());
+  else
+    throw truncated(where, bytes);
+  return image;
+}
+
 ColorImage decode_color(std::span<const uint8_t> file, const std::string& where) {
   const ImageHeader header = read_image_header(file, where);
   check_size_is_plausible(header, file, where);

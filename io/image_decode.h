@@ -41,6 +41,11 @@ ImageHeader read_image_header(std::span<const uint8_t> file, const std::string& 
 /// Throws ImageError.
 Image<uint16_t> decode_gray16(std::span<const uint8_t> file, const std::string& where);
 
+/// Depth of a .sens container: width x height little-endian 16-bit values, behind a zlib stream where `compressed`.
+/// Throws ImageError ("truncated").
+Image<uint16_t> decode_u16_values(std::span<const uint8_t> bytes, bool compressed, int width, int height,
+                                  const std::string& where);
+
 /// Colour from JPEG or PNG; grey is spread over the channels, 16 bits are cut to 8, alpha is dropped (255).
 /// Throws ImageError.
 ColorImage decode_color(std::span<const uint8_t> file, const std::string& where);

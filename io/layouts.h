@@ -20,6 +20,7 @@ struct Layout {
 /// In the order in which detection asks them.
 std::span<const Layout> all_layouts();
 
-extern const Layout kSevenScenesLayout, kTumLayout, kReplicaLayout, kGenericLayout;
+extern const Layout kSevenScenesLayout, kTumLayout, kReplicaLayout, kGenericLayout, kRedwoodLayout, kScanNetLayout,
+    kSensLayout, kIclLayout, kApcLayout;
 
 }  // namespace felt

@@ -73,6 +73,7 @@ private:
   ColorImage read_color(const ImageSource& source, const DepthImage& depth_m) const;
   Image<uint16_t> read_ids(const ImageSource& source, const std::string& kind, const DepthImage& depth_m) const;
   ProbabilityImage read_probabilities(const ImageSource& source) const;
+  ProbabilityImage read_class_maps(const FrameRecord& frame) const;
   PinholeCamera camera_of_color_grid(int width, int height) const;
   bool on_depth_grid(int width, int height) const;
 
@@ -104,7 +105,7 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   with_color_ = options.read_color && any([](const FrameRecord& f) { return !f.color.empty(); });
   info_.has_color = with_color_;
   info_.has_labels = any([](const FrameRecord& f) { return !f.labels.empty(); });
-  info_.has_probabilities = any([](const FrameRecord& f) { return !f.probabilities.empty(); });
+  info_.has_probabilities = any([](const FrameRecord& f) { return !f.probabilities.empty() || !f.class_maps.empty(); });
   info_.has_instances = any([](const FrameRecord& f) { return !f.instances.empty(); });
 
   if (listing_.depth_is_ray_length) {
@@ -159,7 +160,10 @@ ReadResult ListedSequence::read(int64_t i) const {
     if (with_color_) frame.color = read_color(record.color, frame.depth_m);
     if (!record.labels.empty()) frame.labels = read_ids(record.labels, "label", frame.depth_m);
     if (!record.instances.empty()) frame.instances = read_ids(record.instances, "instance", frame.depth_m);
-    if (!record.probabilities.empty()) frame.probabilities = read_probabilities(record.probabilities);
+    if (!record.probabilities.empty())
+      frame.probabilities = read_probabilities(record.probabilities);
+    else if (!record.class_maps.empty())
+      frame.probabilities = read_class_maps(record);
     return frame;
   } catch (const Skip& skip) {
     return SkippedFrame{record.index, skip.reason, "frame " + std::to_string(record.index) + ": " + skip.detail};
@@ -196,7 +200,11 @@ Eigen::Isometry3d ListedSequence::read_pose(const FrameRecord& frame) const {
 }
 
 DepthImage ListedSequence::read_depth(const ImageSource& source) const {
-  const Image<uint16_t> raw = decoded(source, "depth", decode_gray16);
+  const Image<uint16_t> raw = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
+    if (source.codec == ImageSource::Codec::image_file) return decode_gray16(bytes, where);
+    return decode_u16_values(bytes, source.codec == ImageSource::Codec::zlib_u16, info_.camera.width,
+                             info_.camera.height, where);
+  });
   if (raw.width() != info_.camera.width || raw.height() != info_.camera.height)
     throw Skip{"wrong-size depth image",
                describe_mismatch(source.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
@@ -265,6 +273,34 @@ ProbabilityImage ListedSequence::read_probabilities(const ImageSource& source) c
       image.class_id[p * top + m] = stack.data()[m * pixels + p];
       image.probability[p * top + m] = float(stack.data()[(top + m) * pixels + p]) / 65535.0f;
     }
+  return image;
+}
+
+ProbabilityImage ListedSequence::read_class_maps(const FrameRecord& frame) const {
+  const int width = info_.camera.width, height = info_.camera.height;
+  const size_t pixels = size_t(width) * height, top = frame.class_maps.size() + 1;
+  ProbabilityImage image{width, height, int(top), std::vector<uint16_t>(pixels * top),
+                         std::vector<float>(pixels * top)};
+  for (size_t m = 1; m < top; ++m) {
+    const auto& [class_id, source] = frame.class_maps[m - 1];
+    const Image<uint16_t> map = decoded(source, "probability", decode_gray16);
+    if (map.width() != width || map.height() != height)
+      throw Skip{"wrong-size probability image",
+                 describe_mismatch(source.path.string(), "size", size_text(width, height),
+                                   size_text(map.width(), map.height()))};
+    for (size_t p = 0; p < pixels; ++p) {
+      image.class_id[p * top + m] = class_id;
+      image.probability[p * top + m] = float(map.data()[p]) / 65535.0f;
+    }
+  }
+  // Maps of single classes need not sum to one: class 0 takes what is missing, an excess is scaled away.
+  for (size_t p = 0; p < pixels; ++p) {
+    float* const probability = &image.probability[p * top];
+    float sum = 0;
+    for (size_t m = 1; m < top; ++m) sum += probability[m];
+    probability[0] = std::max(0.0f, 1 - sum);
+    for (size_t m = 1; m < top && sum > 1; ++m) probability[m] /= sum;
+  }
   return image;
 }
 

@@ -62,7 +62,8 @@ void apply_options(const SequenceOptions& options, SequenceListing& listing) {
 }  // namespace
 
 std::span<const Layout> all_layouts() {
-  static const Layout layouts[] = {kGenericLayout, kTumLayout, kReplicaLayout, kSevenScenesLayout};
+  static const Layout layouts[] = {kGenericLayout, kTumLayout,     kReplicaLayout, kApcLayout, kSevenScenesLayout,
+                                   kSensLayout,    kScanNetLayout, kRedwoodLayout, kIclLayout};
   return layouts;
 }
 

@@ -88,12 +88,22 @@ constexpr UnfilterRow kUnfilterRow[9] = {nullptr, unfilter_row<1>, unfilter_row<
 
 }  // namespace
 
+void inflate_zlib(std::span<const uint8_t> packed, std::span<uint8_t> out, const std::string& where) {
+  thread_local const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> inflater(
+      libdeflate_alloc_decompressor(), libdeflate_free_decompressor);
+  const libdeflate_result result =
+      libdeflate_zlib_decompress(inflater.get(), packed.data(), packed.size(), out.data(), out.size(), nullptr);
+  const std::string expected = std::to_string(out.size()) + " bytes of pixels";
+  if (result == LIBDEFLATE_SHORT_OUTPUT)
+    throw ImageError("truncated", describe_mismatch(where, "compressed image", expected, "fewer"));
+  if (result != LIBDEFLATE_SUCCESS)
+    throw ImageError("unreadable", describe_mismatch(where, "compressed image", expected, "damaged or longer data"));
+}
+
 bool has_plain_rows(std::span<const uint8_t> png) { return png.size() >= kHeaderEnd && png[kInterlaceAt] == 0; }
 
 PngRows decode_png_rows(std::span<const uint8_t> png, int height, size_t row_bytes, int pixel_bytes,
                         std::vector<uint8_t>& buffer, const std::string& where) {
-  thread_local const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> inflater(
-      libdeflate_alloc_decompressor(), libdeflate_free_decompressor);
   thread_local std::vector<uint8_t> joined;
   const std::span<const uint8_t> packed = image_data(png, joined, where);
 
@@ -102,12 +112,7 @@ PngRows decode_png_rows(std::span<const uint8_t> png, int height, size_t row_byt
   buffer.resize(stride * (size_t(height) + 1));
   std::memset(buffer.data(), 0, stride);
   uint8_t* const rows = buffer.data() + stride;
-  const libdeflate_result result =
-      libdeflate_zlib_decompress(inflater.get(), packed.data(), packed.size(), rows, stride * size_t(height), nullptr);
-  if (result == LIBDEFLATE_SHORT_OUTPUT)
-    throw ImageError("truncated", describe_mismatch(where, "PNG", std::to_string(height) + " rows", "fewer"));
-  if (result != LIBDEFLATE_SUCCESS)
-    throw unreadable(where, "an image as large as its header says", "damaged or longer data");
+  inflate_zlib(packed, {rows, stride * size_t(height)}, where);
 
   const UnfilterRow unfilter = kUnfilterRow[pixel_bytes];
   for (size_t v = 0; v < size_t(height); ++v) {

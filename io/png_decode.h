@@ -14,6 +14,10 @@ struct PngRows {
   size_t stride = 0;
 };
 
+/// Inflates a zlib stream that holds exactly as many bytes as `out` takes. Throws ImageError ("truncated" where it
+/// holds fewer, "unreadable" where it is damaged or longer).
+void inflate_zlib(std::span<const uint8_t> packed, std::span<uint8_t> out, const std::string& where);
+
 /// True where `decode_png_rows` can decode the file: a PNG that is not interlaced.
 bool has_plain_rows(std::span<const uint8_t> png);
 

@@ -29,7 +29,7 @@ struct FrameRecord {
   double stamp_s = 0;  ///< or the index where none is recorded
   ImageSource depth, color, labels, instances;
   ImageSource probabilities;                                 ///< stacked top-m image (io/layouts.h)
-  std::vector<std::pair<uint16_t, ImageSource>> class_maps;  ///< one probability image per class id
+  std::vector<std::pair<uint16_t, ImageSource>> class_maps;  ///< a probability image per class id; class 0: the rest
   std::optional<Eigen::Matrix4d> pose;                       ///< as recorded; absent: read from `pose_file`
   std::filesystem::path pose_file;                           ///< empty and no `pose`: the frame has none
   std::string fault, fault_detail;                           ///< why the layout already knows that it cannot be used

@@ -49,6 +49,11 @@ std::map<int64_t, fs::path> numbered_files(const fs::path& folder, const std::st
   return found;
 }
 
+fs::path at_number(const std::map<int64_t, fs::path>& files, int64_t number) {
+  const auto found = files.find(number);
+  return found == files.end() ? fs::path() : found->second;
+}
+
 bool has_numbered_file(const fs::path& folder, const std::string& prefix, const std::vector<std::string>& suffixes) {
   std::error_code fault;
   for (fs::directory_iterator at(folder, fault), end; !fault && at != end; at.increment(fault))

@@ -19,6 +19,9 @@ std::optional<int64_t> trailing_number(std::string_view stem);
 std::map<int64_t, std::filesystem::path> numbered_files(const std::filesystem::path& folder, const std::string& prefix,
                                                         const std::vector<std::string>& suffixes);
 
+/// The file of `number`, or an empty path.
+std::filesystem::path at_number(const std::map<int64_t, std::filesystem::path>& files, int64_t number);
+
 /// True where `folder` directly holds at least one such file.
 bool has_numbered_file(const std::filesystem::path& folder, const std::string& prefix,
                        const std::vector<std::string>& suffixes);

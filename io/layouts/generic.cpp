@@ -141,20 +141,16 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   for (const auto* files : {&depth, &color})
     for (const auto& [number, image] : *files) all.insert(number);
   for (const auto& [number, pose] : pose_of) all.insert(number);
-  const auto at = [](const std::map<int64_t, fs::path>& files, int64_t number) {
-    const auto found = files.find(number);
-    return found == files.end() ? fs::path() : found->second;
-  };
   size_t position = 0;
   for (const int64_t number : all) {
     FrameRecord frame;
     frame.index = number;
     frame.stamp_s = double(number);
-    frame.depth.path = at(depth, number);
-    frame.color.path = at(color, number);
-    frame.labels.path = at(labels, number);
-    frame.probabilities.path = at(probs, number);
-    frame.instances.path = at(instances, number);
+    frame.depth.path = at_number(depth, number);
+    frame.color.path = at_number(color, number);
+    frame.labels.path = at_number(labels, number);
+    frame.probabilities.path = at_number(probs, number);
+    frame.instances.path = at_number(instances, number);
     if (by_number) {
       if (const auto found = pose_of.find(number); found != pose_of.end()) frame.pose = found->second->matrix;
     } else if (!frame.depth.empty()) {

@@ -21,10 +21,6 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
              semantic = numbered_files(path / "semantic", "semantic", {".png"}),
              instance = numbered_files(path / "instance", "instance", {".png"});
   const std::vector<StampedPose> poses = read_trajectory(path / "traj.txt", false);
-  const auto at = [](const std::map<int64_t, fs::path>& files, int64_t number) {
-    const auto found = files.find(number);
-    return found == files.end() ? fs::path() : found->second;
-  };
   // Line n of traj.txt belongs to frame n, so a frame without images shows as a missing one.
   const int64_t count = std::max(int64_t(poses.size()), depth.empty() ? 0 : depth.rbegin()->first + 1);
   if (count > int64_t(poses.size() + depth.size()) + 1000000)
@@ -34,10 +30,10 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
     FrameRecord frame;
     frame.index = number;
     frame.stamp_s = double(number);
-    frame.depth.path = at(depth, number);
-    frame.color.path = at(color, number);
-    frame.labels.path = at(semantic, number);
-    frame.instances.path = at(instance, number);
+    frame.depth.path = at_number(depth, number);
+    frame.color.path = at_number(color, number);
+    frame.labels.path = at_number(semantic, number);
+    frame.instances.path = at_number(instance, number);
     if (number < int64_t(poses.size())) frame.pose = poses[size_t(number)].matrix;
     listing.frames.push_back(std::move(frame));
   }

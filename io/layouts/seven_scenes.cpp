@@ -40,18 +40,14 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   std::set<int64_t> numbers;
   for (const auto* files : {&depth, &color, &pose})
     for (const auto& [number, file] : *files) numbers.insert(number);
-  const auto at = [](const std::map<int64_t, fs::path>& files, int64_t number) {
-    const auto found = files.find(number);
-    return found == files.end() ? fs::path() : found->second;
-  };
   for (const int64_t number : numbers) {
     FrameRecord frame;
     frame.index = number;
     frame.stamp_s = double(number);
-    frame.depth.path = at(depth, number);
-    frame.color.path = at(color, number);
-    frame.labels.path = at(labels, number);
-    frame.pose_file = at(pose, number);
+    frame.depth.path = at_number(depth, number);
+    frame.color.path = at_number(color, number);
+    frame.labels.path = at_number(labels, number);
+    frame.pose_file = at_number(pose, number);
     listing.frames.push_back(std::move(frame));
   }
   const fs::path above = folder.parent_path();

@@ -121,6 +121,37 @@ void write_replica(const fs::path& folder, int frames) {
   write_text(folder / "traj.txt", trajectory);
 }
 
+void write_redwood(const fs::path& folder, int frames) {
+  for (const char* name : {"depth", "color"}) fs::create_directories(folder / name);
+  write_text(folder / "intrinsic.json",
+             R"({"width": 24, "height": 16, "intrinsic_matrix": [20, 0, 0, 0, 20, 0, 11.5, 7.5, 1]})");
+  std::string log;
+  for (int i = 0; i < frames; ++i) {
+    write_bytes(folder / "depth" / number("%05d.png", i), encode_png(stored_depth(i, 1000)));
+    write_bytes(folder / "color" / number("%05d.png", i), encode_png(color_image(i)));
+    log += number("%d ", i) + number("%d ", i) + number("%d\n", i + 1) + matrix_text(pose_at(i).matrix(), "\n") + "\n";
+  }
+  write_text(folder / "trajectory.log", log);
+}
+
+void write_icl(const fs::path& folder, int frames) {
+  for (const char* name : {"depth", "color"}) fs::create_directories(folder / name);
+  write_text(folder / "intrinsics.txt", "20 0 11.5\n0 20 7.5\n0 0 1\n");
+  for (int i = 0; i < frames; ++i) {
+    write_bytes(folder / "depth" / number("%d.png", i), encode_png(stored_depth(i, 1000)));
+    write_bytes(folder / "color" / number("%d.png", i), encode_png(color_image(i)));
+    write_text(folder / "pose" / number("%d.txt", i), matrix_text(pose_at(i).matrix(), "\n"));
+  }
+}
+
+void write_scannet(const fs::path& folder, int frames) {
+  write_icl(folder, frames);
+  fs::remove(folder / "intrinsics.txt");
+  const char* camera = "20 0 11.5 0\n0 20 7.5 0\n0 0 1 0\n0 0 0 1\n";
+  write_text(folder / "intrinsic" / "intrinsic_depth.txt", camera);
+  write_text(folder / "intrinsic" / "intrinsic_color.txt", camera);
+}
+
 void write_generic(const fs::path& folder, int frames) {
   for (const char* name : {"depth", "color", "labels"}) fs::create_directories(folder / name);
   write_text(folder / "sequence.yaml",

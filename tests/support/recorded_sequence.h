@@ -28,6 +28,9 @@ std::string translation_quaternion_text(const Eigen::Isometry3d& T);
 void write_seven_scenes(const std::filesystem::path& folder, int frames);
 void write_tum(const std::filesystem::path& folder, int frames);
 void write_replica(const std::filesystem::path& folder, int frames);
+void write_redwood(const std::filesystem::path& folder, int frames);
+void write_icl(const std::filesystem::path& folder, int frames);
+void write_scannet(const std::filesystem::path& folder, int frames);
 void write_generic(const std::filesystem::path& folder, int frames);
 
 }  // namespace felt::test

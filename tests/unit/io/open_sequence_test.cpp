@@ -58,7 +58,9 @@ TEST_CASE("every layout is recognised and gives the same frames") {
     int color_error;
   };
   const auto c = GENERATE(Case{"7scenes", write_seven_scenes, 1e-3, 0}, Case{"tum", write_tum, 2e-4, 0},
-                          Case{"replica", write_replica, 1 / 6553.5, 12}, Case{"generic", write_generic, 5e-4, 0});
+                          Case{"replica", write_replica, 1 / 6553.5, 12}, Case{"generic", write_generic, 5e-4, 0},
+                          Case{"redwood", write_redwood, 1e-3, 0}, Case{"icl", write_icl, 1e-3, 0},
+                          Case{"scannet", write_scannet, 1e-3, 0});
   TemporaryDirectory folder;
   const fs::path path = folder.path() / "ein Ordner \xc3\xbc";
   c.write(path, 3);

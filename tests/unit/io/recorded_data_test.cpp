@@ -59,7 +59,11 @@ TEST_CASE("frames of recorded sequences overlap as well as their descriptions st
       Pair{"7scenes_redkitchen_png", "7scenes", 150, 170, 0.0118}, Pair{"sun3d_nvblox_5", "7scenes", 0, 1, 0.0098},
       Pair{"labelfusion_shelf", "7scenes", 0, 1, 0.0040}, Pair{"labelfusion_shelf", "7scenes", 5, 6, 0.0031},
       Pair{"house_living_rendered", "replica", 0, 3, 0.0020},
-      Pair{"house_living_rendered", "replica", 100, 105, 0.0024}, Pair{"tum_fr1_rpy", "tum", 10, 13, 0.0102});
+      Pair{"house_living_rendered", "replica", 100, 105, 0.0024}, Pair{"tum_fr1_rpy", "tum", 10, 13, 0.0102},
+      Pair{"open3d_redwood_5", "redwood", 0, 1, 0.0050}, Pair{"open3d_redwood_5", "redwood", 0, 4, 0.0055},
+      Pair{"icl_livingroom_maskrcnn", "icl", 200, 230, 0.0008},
+      Pair{"icl_livingroom_maskrcnn", "icl", 401, 440, 0.0008}, Pair{"apc_shelf_probs", "apc", 0, 1, 0.0037},
+      Pair{"apc_shelf_probs", "apc", 5, 6, 0.0034});
   FELTMAP_REQUIRE_DATA(folder, pair.data);
   INFO(pair.data << " " << pair.a << " " << pair.b);
   const auto reader = open_sequence(folder, {.read_color = false});
@@ -108,4 +112,42 @@ TEST_CASE("the TUM recording leaves out the depth images that have no colour par
   CHECK(reader->size() == 50);
   CHECK(frames == 44);
   CHECK(without_color == 6);
+}
+
+TEST_CASE("a .sens container gives the frames it was made of, and its lost frame is skipped") {
+  FELTMAP_REQUIRE_DATA(folder, "scannet_sens_small");
+  FELTMAP_REQUIRE_DATA(house, "house_living_rendered");
+  const auto reader = open_sequence(folder / "house_living.sens");
+  CHECK(reader->info().layout == "sens");
+  REQUIRE(reader->size() == 16);
+  int skipped = 0;
+  for (int64_t i = 0; i < reader->size(); ++i) {
+    const ReadResult result = reader->read(i);
+    const auto* skip = std::get_if<SkippedFrame>(&result);
+    skipped += skip != nullptr;
+    if (skip != nullptr) CHECK((i == 14 && skip->reason == "non-finite pose"));
+  }
+  CHECK(skipped == 1);
+  const Frame first = frame_numbered(*reader, 0), original = frame_numbered(*open_sequence(house), 0);
+  CHECK(first.T_world_camera.isApprox(original.T_world_camera, 1e-5));
+  CHECK(first.color == original.color);
+  for (size_t p = 0; p < first.depth_m.size(); p += 97)
+    CHECK(std::abs(first.depth_m.data()[p] - original.depth_m.data()[p]) < 0.0007f);  // millimetres are stored
+}
+
+TEST_CASE("probability maps of single classes become probabilities that sum to one") {
+  FELTMAP_REQUIRE_DATA(folder, "apc_shelf_probs");
+  const auto reader = open_sequence(folder);
+  CHECK(reader->info().has_probabilities);
+  CHECK(reader->info().classes.size() == 5);
+  const Frame frame = frame_numbered(*reader, 3);
+  REQUIRE(frame.probabilities.top == 5);
+  float most = 0;
+  for (size_t p = 0; p < frame.depth_m.size(); p += 13) {
+    float sum = 0;
+    for (size_t m = 0; m < 5; ++m) sum += frame.probabilities.probability[p * 5 + m];
+    for (size_t m = 1; m < 5; ++m) most = std::max(most, frame.probabilities.probability[p * 5 + m]);
+    REQUIRE(sum == Approx(1).margin(1e-5));
+  }
+  CHECK(most > 0.5f);
 }
