@@ -24,6 +24,7 @@ void add_commands(CLI::App& app) {
   app.require_subcommand(1);
   app.set_version_flag("--version", [] { return "feltmap " FELTMAP_VERSION " (SIMD: " + simd_name() + ")"; });
   add_simulate(app);
+  add_infer(app);
   app.footer("Each command explains itself, with an example: feltmap <command> --help");
   add_merge(app);
   add_diff(app);

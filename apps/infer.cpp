@@ -1,0 +1,57 @@
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "apps/command.h"
+#include "apps/commands.h"
+#include "apps/exit_code.h"
+#include "core/error.h"
+#include "core/simd.h"
+#include "io/infer_json.h"
+
+namespace felt::apps {
+namespace {
+
+struct InferOptions : CommonOptions {
+  InferPrecision precision = InferPrecision::f64;
+  std::string simd;
+};
+
+int run_infer(const InferOptions& options) {
+  if (!options.simd.empty()) choose_simd(options.simd, "--simd");
+  std::ios::sync_with_stdio(false);
+  size_t number = 0, faulty = 0;
+  for (std::string line; std::cout && std::getline(std::cin, line);) {
+    const InferAnswer answer = infer_json_line(line, ++number, options.precision);
+    std::cout << answer.json << '\n';
+    faulty += answer.failed;
+  }
+  std::cout.flush();
+  if (!std::cout) throw IoError("stdout: cannot write the answers");
+  // Faulty lines are answered in place, so the command itself has done its job.
+  if (faulty > 0) spdlog::warn("infer: {} of {} lines were faulty", faulty, number);
+  return kDone;
+}
+
+}  // namespace
+
+void add_infer(CLI::App& app) {
+  auto options = std::make_shared<InferOptions>();
+  CLI::App& command = add_command(
+      app,
+      {"infer", "Answer touch updates, one JSON document a line from stdin to stdout, without a map",
+       R"(echo '{"prior": {"alpha": [1, 1], "tau": [0.39, 0.19], "kappa": [50, 50], "beta": [25, 25], "gamma": [0.126, 0.053]}, "rho": 0.5, "psi": [0.15]}' | feltmap infer)"},
+      *options, [options] { return run_infer(*options); });
+  command.add_option("--precision", options->precision, "f64: the specification; f32: the batch kernels of the map")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, InferPrecision>{{"f64", InferPrecision::f64}, {"f32", InferPrecision::f32}}))
+      ->default_str("f64");
+  command.add_option("--simd", options->simd,
+                     "Target of the f32 kernels: scalar, sse4, avx2, avx3 (best one if absent)");
+}
+
+}  // namespace felt::apps
