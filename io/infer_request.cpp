@@ -66,7 +66,10 @@ json parse_object(std::string_view line) {
       try {
         document = json::parse(line);
       } catch (const json::exception& e) {
-        throw FormatError("line: expected one JSON document, found malformed JSON (" + std::string(e.what()) + ")");
+        // Of "[json.exception...] parse error at line 1, column 22: ..." the part from the column on: the line is ours.
+        const std::string what = e.what();
+        const size_t column = what.find("column");
+        fail("line", "one JSON document", "malformed JSON at " + (column == what.npos ? what : what.substr(column)));
       }
     }
   }

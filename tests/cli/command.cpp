@@ -19,11 +19,12 @@ std::string file_text(const std::filesystem::path& file) {
 
 }  // namespace
 
-CommandResult run_feltmap(const std::string& arguments) {
+CommandResult run_feltmap(const std::string& arguments, const std::string& input) {
   const TemporaryDirectory directory;
-  const auto out = directory.path() / "out", err = directory.path() / "err";
-  const std::string line = felt::test::command().string() + " " + arguments + " < /dev/null > '" + out.string() +
-                           "' 2> '" + err.string() + "'";
+  const auto in = directory.path() / "in", out = directory.path() / "out", err = directory.path() / "err";
+  std::ofstream(in, std::ios::binary) << input;
+  const std::string line = felt::test::command().string() + " " + arguments + " < '" + in.string() + "' > '" +
+                           out.string() + "' 2> '" + err.string() + "'";
   const int status = std::system(line.c_str());
   CommandResult result;
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

@@ -11,7 +11,7 @@ struct CommandResult {
   std::string err;
 };
 
-/// Runs `feltmap <arguments>` through the shell (quote what needs it) with empty stdin and waits for it.
-CommandResult run_feltmap(const std::string& arguments);
+/// Runs `feltmap <arguments>` through the shell (quote what needs it) with `input` on stdin and waits for it.
+CommandResult run_feltmap(const std::string& arguments, const std::string& input = "");
 
 }  // namespace felt::test
