@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "apps/command.h"
 #include "apps/commands.h"
@@ -12,26 +13,35 @@
 #include "core/error.h"
 #include "core/simd.h"
 #include "io/infer_json.h"
+#include "io/infer_plot.h"
 
 namespace felt::apps {
 namespace {
 
+constexpr size_t kMostPlotted = 20;
+
 struct InferOptions : CommonOptions {
   InferPrecision precision = InferPrecision::f64;
   std::string simd;
+  std::string plot;
 };
 
 int run_infer(const InferOptions& options) {
   if (!options.simd.empty()) choose_simd(options.simd, "--simd");
   std::ios::sync_with_stdio(false);
   size_t number = 0, faulty = 0;
+  std::vector<Plot> panels;
   for (std::string line; std::cout && std::getline(std::cin, line);) {
     const InferAnswer answer = infer_json_line(line, ++number, options.precision);
     std::cout << answer.json << '\n';
     faulty += answer.failed;
+    if (!options.plot.empty() && !answer.failed && number <= kMostPlotted) {
+      for (Plot& panel : infer_plots(line, "line " + std::to_string(number))) panels.push_back(std::move(panel));
+    }
   }
   std::cout.flush();
   if (!std::cout) throw IoError("stdout: cannot write the answers");
+  if (!options.plot.empty()) write_plot_svg(options.plot, panels, 2);
   // Faulty lines are answered in place, so the command itself has done its job.
   if (faulty > 0) spdlog::warn("infer: {} of {} lines were faulty", faulty, number);
   return kDone;
@@ -50,6 +60,8 @@ void add_infer(CLI::App& app) {
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, InferPrecision>{{"f64", InferPrecision::f64}, {"f32", InferPrecision::f32}}))
       ->default_str("f64");
+  command.add_option("--plot", options->plot,
+                     "Write an SVG with the density of the next reading before and after each of the first 20 lines");
   command.add_option("--simd", options->simd,
                      "Target of the f32 kernels: scalar, sse4, avx2, avx3 (best one if absent)");
 }

@@ -204,13 +204,22 @@ MaterialClass quadrature_material_class(const Nig& prior, std::span<const double
           {prior.tau + region, plug_in_variance(nig) * (1 - rho + next_spread / mass), 2 * beta}};
 }
 
+bool needs_quadrature(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd, double rho) {
+  const double v = plug_in_variance(prior), unshared = v * (psi.size() == 1 ? 1 : 1 - rho);
+  for (size_t i = 0; i < psi.size(); ++i) {
+    const double noise2 = noise_sd[i] * noise_sd[i], d = psi[i] - prior.tau;
+    const double z2 = d * d / (v * (1 + 1 / prior.kappa) + noise2);
+    if (noise2 * (1 + z2) * (1 + z2) > unshared / 3) return true;
+  }
+  return false;
+}
+
 MaterialClass noisy_material_class(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd,
                                    double rho) {
-  if (psi.empty()) return material_class(prior, ReadingStatistics{}, rho);
-  const double largest = *std::max_element(noise_sd.begin(), noise_sd.end());
-  if (largest == 0) return material_class(prior, statistics_of(psi), rho);
-  const double unshared = plug_in_variance(prior) * (psi.size() == 1 ? 1 : 1 - rho);
-  const auto by = largest * largest > unshared / 3 ? quadrature_material_class : tempered_material_class;
+  if (std::all_of(noise_sd.begin(), noise_sd.end(), [](double s) { return s == 0; })) {
+    return material_class(prior, statistics_of(psi), rho);
+  }
+  const auto by = needs_quadrature(prior, psi, noise_sd, rho) ? quadrature_material_class : tempered_material_class;
   return by(prior, psi, noise_sd, rho);
 }
 

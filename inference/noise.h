@@ -17,12 +17,16 @@ struct NoisyReading {
   Nig posterior;
 };
 
-/// The update to use: exact without noise, `tempered` up to noise_sd^2 = v/3, `quadrature` beyond.
+/// Whether the closed form may err by more than 0.03 nat in the log evidence: where noise_sd^2 (1 + z^2)^2 > v/3 for
+/// some reading, z its distance from tau in predictive standard deviations. Always so above noise_sd^2 = v/3, and in
+/// the tails earlier. Of several readings v counts only as far as they do not share it: v (1 - rho).
+bool needs_quadrature(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd, double rho);
+
+/// The update to use: exact without noise, else quadrature where it is needed and the closed form elsewhere.
 NoisyReading noisy_update(const Nig& prior, double psi, double noise_sd);
 
-/// Several readings of one region with correlation rho in [0, 1) between them, noise of its own on each
-/// (`noise_sd`: one a reading). Chooses by the largest noise_sd^2 against a third of the variance that readings do not
-/// share: v (1 - rho), or v where there is one reading.
+/// Several readings of one region with correlation rho in [0, 1) between them and noise of its own on each (`noise_sd`:
+/// one a reading), by the same choice.
 MaterialClass noisy_material_class(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd,
                                    double rho);
 

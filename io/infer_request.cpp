@@ -201,6 +201,9 @@ InferRequest parse_infer_request(std::string_view line) {
   InferRequest request;
   request.model = parse_model(document);
   parse_prior(required(document, "prior", "prior"), request);
+  if (const auto names = document.find("names"); names != document.end() && names->is_array()) {
+    for (const json& name : *names) request.names.push_back(name.is_string() ? name.get<std::string>() : shown(name));
+  }
   if (request.model == InferRequest::Model::predict) {
     const auto list = [&](const char* name, auto check) {
       return document.contains(name) ? numbers(document[name], name, check) : std::vector<double>{};

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/plot_svg.h"
+
+namespace felt {
+
+/// Densities of the next reading before and after the readings of one line of `feltmap infer`: two panels, each with
+/// the Student-t mixture, its weighted components and, dashed, the plug-in normal mixture. Throws FormatError for a
+/// line that cannot be used.
+std::vector<Plot> infer_plots(std::string_view line, const std::string& title);
+
+}  // namespace felt
