@@ -12,6 +12,7 @@
 #include "apps/exit_code.h"
 #include "core/error.h"
 #include "core/simd.h"
+#include "io/fit_priors.h"
 #include "io/infer_json.h"
 #include "io/infer_plot.h"
 
@@ -24,10 +25,16 @@ struct InferOptions : CommonOptions {
   InferPrecision precision = InferPrecision::f64;
   std::string simd;
   std::string plot;
+  std::string fit_priors;
+  double max_nu_0 = kDefaultPriorReadings;
 };
 
 int run_infer(const InferOptions& options) {
   if (!options.simd.empty()) choose_simd(options.simd, "--simd");
+  if (!options.fit_priors.empty()) {
+    std::cout << fit_priors_json(read_readings_csv(options.fit_priors), options.max_nu_0) << '\n';
+    return kDone;
+  }
   std::ios::sync_with_stdio(false);
   size_t number = 0, faulty = 0;
   std::vector<Plot> panels;
@@ -56,14 +63,20 @@ void add_infer(CLI::App& app) {
       {"infer", "Answer touch updates, one JSON document a line from stdin to stdout, without a map",
        R"(echo '{"prior": {"alpha": [1, 1], "tau": [0.39, 0.19], "kappa": [50, 50], "beta": [25, 25], "gamma": [0.126, 0.053]}, "rho": 0.5, "psi": [0.15]}' | feltmap infer)"},
       *options, [options] { return run_infer(*options); });
-  command.add_option("--precision", options->precision, "f64: the specification; f32: the batch kernels of the map")
+  command
+      .add_option("--precision", options->precision,
+                  "f64: numbers as given; f32: rounded to the single precision of a map")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, InferPrecision>{{"f64", InferPrecision::f64}, {"f32", InferPrecision::f32}}))
       ->default_str("f64");
   command.add_option("--plot", options->plot,
                      "Write an SVG with the density of the next reading before and after each of the first 20 lines");
-  command.add_option("--simd", options->simd,
-                     "Target of the f32 kernels: scalar, sse4, avx2, avx3 (best one if absent)");
+  command.add_option("--fit-priors", options->fit_priors,
+                     "Instead: fit priors to the readings of a CSV (class, group, value) and print them as JSON");
+  command.add_option("--max-nu", options->max_nu_0, "Most readings that a fitted prior may stand for")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command.add_option("--simd", options->simd, "Target of the kernels: scalar, sse4, avx2, avx3 (best one if absent)");
 }
 
 }  // namespace felt::apps

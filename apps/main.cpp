@@ -31,6 +31,8 @@ void add_commands(CLI::App& app) {
   add_query(app);
   add_suggest(app);
   add_friction(app);
+  add_infer(app);
+  app.footer("Each command explains itself, with an example: feltmap <command> --help");
   add_merge(app);
   add_diff(app);
   add_verify(app);

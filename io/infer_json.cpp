@@ -1,6 +1,7 @@
 #include "io/infer_json.h"
 
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
@@ -111,6 +112,25 @@ ordered_json answer_predict(const InferRequest& in) {
   return out;
 }
 
+// What a map's float planes would hold.
+void round_to_single(InferRequest& in) {
+  const auto rounded = [](double x, const char* field) {
+    const double single = double(float(x));
+    const bool lost =
+        !std::isfinite(single) || (x != 0 && std::abs(single) < double(std::numeric_limits<float>::min()));
+    if (lost)
+      throw FormatError(std::string(field) + ": expected a number in the range of single precision, found one outside");
+    return single;
+  };
+  for (double& x : in.a) x = rounded(x, "prior.a");
+  for (double& x : in.psi) x = rounded(x, "psi");
+  for (double& x : in.noise_sd) x = rounded(x, "sigma");
+  for (Nig& p : in.prior) {
+    p = {rounded(p.tau, "prior.tau"), rounded(p.kappa, "prior.kappa"), rounded(p.beta, "prior.beta"),
+         rounded(p.gamma, "prior.gamma")};
+  }
+}
+
 ordered_json answer(const InferRequest& in) {
   switch (in.model) {
     case InferRequest::Model::mixture:
@@ -125,9 +145,11 @@ ordered_json answer(const InferRequest& in) {
 
 }  // namespace
 
-InferAnswer infer_json_line(std::string_view line, size_t number_of_line, InferPrecision) {
+InferAnswer infer_json_line(std::string_view line, size_t number_of_line, InferPrecision precision) {
   try {
-    return {answer(parse_infer_request(line)).dump(), false};
+    InferRequest request = parse_infer_request(line);
+    if (precision == InferPrecision::f32) round_to_single(request);
+    return {answer(request).dump(), false};
   } catch (const Error& e) {
     const ordered_json error{{"error", e.what()}, {"line", number_of_line}};
     return {error.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace), true};

@@ -6,7 +6,8 @@
 
 namespace felt {
 
-/// Number type of the update: f64 is the scalar specification, f32 the batch kernels.
+/// f64: numbers as given. f32: priors and readings rounded to the single precision that a map stores, then the same
+/// scalar arithmetic.
 enum class InferPrecision { f64, f32 };
 
 /// One answer of `feltmap infer`.

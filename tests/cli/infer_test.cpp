@@ -71,6 +71,19 @@ TEST_CASE("infer takes the lines of all three golden files and answers with thei
   }
 }
 
+TEST_CASE("infer draws densities and fits priors") {
+  const TemporaryDirectory directory;
+  const auto svg = directory.path() / "out.svg", csv = directory.path() / "readings.csv";
+  const std::string line = R"({"prior": {"tau": 0.4, "kappa": 50, "beta": 25, "gamma": 0.1}, "psi": 0.3})";
+  CHECK(run_feltmap("infer --plot '" + svg.string() + "'", line + "\n").exit_code == 0);
+  CHECK(text_of(svg).substr(0, 4) == "<svg");
+  std::ofstream(csv) << "class,group,value\nice,a,0.1\nice,a,0.2\nice,b,0.3\nice,b,0.2\n";
+  const CommandResult fitted = run_feltmap("infer --fit-priors '" + csv.string() + "'");
+  CHECK(fitted.exit_code == 0);
+  CHECK(json::parse(fitted.out)["classes"][0]["mean"].get<double>() == Approx(0.2));
+  CHECK(run_feltmap("infer --fit-priors /no/such/file").exit_code == 4);
+}
+
 TEST_CASE("infer refuses a precision or a target that it does not know") {
   CHECK(run_feltmap("infer --precision f16").exit_code == 2);
   CHECK(run_feltmap("infer --simd sideways").exit_code == 3);

@@ -65,7 +65,7 @@ std::vector<double> kl_divergences(const StudentTMixture& p, const std::vector<S
     width += p.weight[c] * (std::sqrt(p.component[c].scale2) + std::abs(p.component[c].location - centre));
   }
   // The trapezoidal rule converges exponentially for such integrands.
-  constexpr double kReach = 7, kStep = 0.04;
+  constexpr double kReach = 7, kStep = 0.02;
   std::vector<double> sum(qs.size(), 0);
   for (double u = -kReach; u < kReach; u += kStep) {
     const double x = centre + width * std::sinh(u), density = pdf(p, x);

@@ -155,7 +155,7 @@ TEST_CASE(
 }
 
 TEST_CASE("over sequences of touches the KL projection stays nearer to the exact predictive than the published one") {
-  constexpr int kRuns = 8;
+  constexpr int kRuns = 12;
   for (const MixtureSetting& setting : mixture_settings()) {
     const auto [kl, published] = test::projection_errors(setting, kRuns);
     INFO(setting.name << ": mean KL " << kl.mean_divergence << " (kl), " << published.mean_divergence

@@ -110,6 +110,15 @@ TEST_CASE("an unusable line is answered with its number and the field at fault")
   }
 }
 
+TEST_CASE("single precision rounds what goes in and refuses what it cannot hold") {
+  const json twice = json::parse(infer_json_line(kGood, 1, InferPrecision::f32).json), once = ask(kGood);
+  const double exact = once["log_evidence"], single = twice["log_evidence"];
+  CHECK(single != exact);
+  CHECK(single == Approx(exact).epsilon(1e-5));
+  CHECK(infer_json_line(good_with("/prior/gamma/0", 1e-50).dump(), 1, InferPrecision::f32).failed);
+  CHECK_FALSE(infer_json_line(good_with("/prior/gamma/0", 1e-50).dump(), 1).failed);
+}
+
 TEST_CASE("a prediction gives null with the reason for what does not exist") {
   const json answer = ask(
       R"({"model": "predict", "prior": {"a": [1, 2], "tau": [0, 1], "kappa": [1, 1], "beta": [0.4, 1], "gamma": [1, 1]}, "quantiles": [0.5], "cvar": [0.1], "below": [0.5]})");
