@@ -28,6 +28,8 @@ void add_commands(CLI::App& app) {
   add_merge(app);
   add_diff(app);
   add_verify(app);
+  add_render(app);
+  add_evaluate(app);
 }
 
 int run(int argc, char** argv) {

@@ -45,6 +45,10 @@ void write_depth_png(const fs::path& path, const DepthImage& depth_m, double met
   write_encoded(path, steps);
 }
 
+void write_label_png(const fs::path& path, const LabelImage& labels) {
+  write_encoded(path, cv::Mat(labels.height(), labels.width(), CV_16UC1, const_cast<uint16_t*>(labels.data())));
+}
+
 ColorImage overview_picture(const TriangleMesh& mesh, const Eigen::Vector3d& up, int panel_width, int panel_height) {
   struct Direction {
     double azimuth_deg, elevation_deg;

@@ -14,6 +14,9 @@ void write_png(const std::filesystem::path& path, const ColorImage& image);
 /// Writes a 16-bit grey PNG: depth in steps of `metres_per_step`, 0 where there is none or it does not fit.
 void write_depth_png(const std::filesystem::path& path, const DepthImage& depth_m, double metres_per_step = 0.001);
 
+/// Writes a 16-bit grey PNG of class ids.
+void write_label_png(const std::filesystem::path& path, const LabelImage& labels);
+
 /// A picture of a whole mesh without a display: two views from above at an angle and one straight down, each in
 /// colour (where the mesh has any), as grey clay, and by normal; walls towards the viewer are left out.
 ColorImage overview_picture(const TriangleMesh& mesh, const Eigen::Vector3d& up, int panel_width = 640,

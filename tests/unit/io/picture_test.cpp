@@ -29,6 +29,11 @@ TEST_CASE("images are written as PNG files that other readers open") {
   CHECK(steps.at<uint16_t>(0, 1) == 1234);
   CHECK(steps.at<uint16_t>(1, 0) == 0);
   CHECK(steps.at<uint16_t>(1, 1) == 0);
+
+  LabelImage labels(2, 1);
+  labels(1, 0) = 40000;
+  write_label_png(folder.path() / "l.png", labels);
+  CHECK(cv::imread((folder.path() / "l.png").string(), cv::IMREAD_UNCHANGED).at<uint16_t>(0, 1) == 40000);
   CHECK_THROWS_AS(write_png(folder.path() / "absent" / "c.png", image), IoError);
 }
 

@@ -1,0 +1,96 @@
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "io/map_file.h"
+#include "io/mesh_io.h"
+#include "mapping/marching_cubes.h"
+#include "tests/cli/command.h"
+#include "tests/support/analytic_map.h"
+#include "tests/support/data.h"
+
+namespace felt::test {
+namespace {
+using Catch::Matchers::Contains;
+
+/// A wall a metre in front of the camera, saved as map.vdb.
+std::filesystem::path wall_map(const TemporaryDirectory& folder) {
+  Map map(0.02, 0.08);
+  fill_map(map, {-20, -20, 44}, {20, 20, 56}, [](const Eigen::Vector3d& p) { return 1.0 - p.z(); });
+  save_map(map, folder.path() / "map.vdb");
+  return folder.path() / "map.vdb";
+}
+
+}  // namespace
+
+TEST_CASE("render writes depth in millimetres and an overview that stock readers open") {
+  const TemporaryDirectory folder;
+  const std::string map = wall_map(folder).string(), out = (folder.path() / "views").string();
+  const CommandResult result = run_feltmap("render " + map + " --pose 0,0,0,0,0,0,1 --pose 0,0,0.25,0,0,0,1 --out " +
+                                           out + " --intrinsics 60,60,15.5,11.5 --size 32x24 --overview " +
+                                           (folder.path() / "o.png").string() + " --json");
+  INFO(result.err);
+  REQUIRE(result.exit_code == 0);
+  CHECK(nlohmann::json::parse(result.out)["views"].size() == 2);
+  const cv::Mat depth = cv::imread(out + "/000000.depth.png", cv::IMREAD_UNCHANGED);
+  REQUIRE((depth.type() == CV_16UC1 && depth.cols == 32 && depth.rows == 24));
+  CHECK(depth.at<uint16_t>(12, 16) == 1000);
+  CHECK(cv::imread(out + "/000001.depth.png", cv::IMREAD_UNCHANGED).at<uint16_t>(12, 16) == 750);
+  CHECK(cv::imread(out + "/000000.normal.png").at<cv::Vec3b>(12, 16) == cv::Vec3b(0, 128, 128));
+  CHECK_FALSE(cv::imread((folder.path() / "o.png").string()).empty());
+}
+
+TEST_CASE("render names what it cannot use") {
+  const TemporaryDirectory folder;
+  const std::string map = wall_map(folder).string();
+  CHECK(run_feltmap("render " + map).exit_code == 3);
+  CHECK(run_feltmap("render " + map + " --pose 1,2,3 --out x").exit_code == 4);
+  const CommandResult classes = run_feltmap("render " + map + " --pose 0,0,0,0,0,0,1 --images class --out x");
+  CHECK(classes.exit_code == 3);
+  CHECK_THAT(classes.err, Contains("a map with classes"));
+  const CommandResult both = run_feltmap("render " + map + " --pose 0,0,0,0,0,0,1 --out x --intrinsics 1,2 --size 0x5");
+  CHECK(both.exit_code == 3);
+  CHECK_THAT(both.err, Contains("--intrinsics") && Contains("--size"));
+  CHECK(run_feltmap("render " + (folder.path() / "absent.vdb").string() + " --pose 0,0,0,0,0,0,1 --out x").exit_code ==
+        2);
+}
+
+TEST_CASE("evaluate measures a known distance and defines every figure") {
+  const TemporaryDirectory folder;
+  const std::string map = wall_map(folder).string(), reference = (folder.path() / "reference.ply").string();
+  TriangleMesh mesh = extract_mesh(load_map(map));
+  for (auto& p : mesh.positions) p.z() += 0.01f;
+  write_mesh(reference, mesh);
+  const CommandResult result =
+      run_feltmap("evaluate " + map + " --reference-mesh " + reference + " --samples 5000 --json");
+  INFO(result.err);
+  REQUIRE(result.exit_code == 0);
+  const auto json = nlohmann::json::parse(result.out);
+  CHECK(json["accuracy_m"]["mean"].get<double>() == Approx(0.01).epsilon(1e-3));
+  CHECK(json["completion_m"]["median"].get<double>() == Approx(0.01).epsilon(1e-3));
+  CHECK(json["f_score"] == 1.0);
+  for (const char* figure : {"accuracy", "completion", "precision", "recall", "f_score", "normal_consistency"})
+    CHECK(json["definitions"].contains(figure));
+  std::ofstream(folder.path() / "t.txt") << "0 0 0 0 0 0 1\n";
+  const CommandResult culled =
+      run_feltmap("evaluate " + map + " --reference-mesh " + reference + " --samples 5000 --json --trajectory " +
+                  (folder.path() / "t.txt").string() + " --intrinsics 320,320,159.5,119.5 --size 320x240");
+  REQUIRE(culled.exit_code == 0);
+  // Of a wall of 0.8 x 0.8 m at 1.01 m the image covers 1.01 x 0.7575 m.
+  CHECK(nlohmann::json::parse(culled.out)["reference_seen"].get<double>() == Approx(0.7575 / 0.8).epsilon(0.01));
+}
+
+TEST_CASE("evaluate without a reference, and with one that is no mesh, says so") {
+  const TemporaryDirectory folder;
+  const std::string map = wall_map(folder).string();
+  CHECK(run_feltmap("evaluate " + map).exit_code == 3);
+  std::ofstream(folder.path() / "bad.ply") << "solid\n";
+  const CommandResult bad =
+      run_feltmap("evaluate " + map + " --reference-mesh " + (folder.path() / "bad.ply").string());
+  CHECK(bad.exit_code == 4);
+  CHECK_THAT(bad.err, Contains("bad.ply") && Contains("expected ply"));
+}
+
+}  // namespace felt::test
