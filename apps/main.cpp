@@ -38,6 +38,8 @@ void add_commands(CLI::App& app) {
   add_verify(app);
   add_infer(app);
   app.footer("Each command explains itself, with an example: feltmap <command> --help");
+  add_render(app);
+  add_evaluate(app);
 }
 
 int run(int argc, char** argv) {
