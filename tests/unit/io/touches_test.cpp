@@ -19,7 +19,7 @@ Map floor_map() {
   Map map = labelled_map(
       0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
       class_table({"wood", "snow", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 0; });
-  map.properties = read_properties(std::string(FELTMAP_SOURCE_DIR) + "/data/friction.yaml");
+  map.properties = read_properties(felt::test::source_dir().string() + "/data/friction.yaml");
   return map;
 }
 
