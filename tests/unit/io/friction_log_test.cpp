@@ -1,6 +1,7 @@
 #include "io/friction_log.h"
 
 #include <algorithm>
+#include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
