@@ -23,11 +23,14 @@ int fail(ExitCode code, const std::string& message) {
 void add_commands(CLI::App& app) {
   app.require_subcommand(1);
   app.set_version_flag("--version", [] { return "feltmap " FELTMAP_VERSION " (SIMD: " + simd_name() + ")"; });
-  add_simulate(app);
   app.footer("Each command explains itself, with an example: feltmap <command> --help");
+  add_reconstruct(app);
+  add_info(app);
+  add_export(app);
   add_merge(app);
   add_diff(app);
   add_verify(app);
+  add_simulate(app);
 }
 
 int run(int argc, char** argv) {

@@ -19,11 +19,11 @@ std::string file_text(const std::filesystem::path& file) {
 
 }  // namespace
 
-CommandResult run_feltmap(const std::string& arguments) {
+CommandResult run_feltmap(const std::string& arguments, const std::string& before, const std::string& after) {
   const TemporaryDirectory directory;
   const auto out = directory.path() / "out", err = directory.path() / "err";
-  const std::string line = felt::test::command().string() + " " + arguments + " < /dev/null > '" + out.string() +
-                           "' 2> '" + err.string() + "'";
+  const std::string line = before + "'" + command().string() + "' " + arguments + " < /dev/null > '" + out.string() +
+                           "' 2> '" + err.string() + "'" + after;
   const int status = std::system(line.c_str());
   CommandResult result;
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

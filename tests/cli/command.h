@@ -11,7 +11,8 @@ struct CommandResult {
   std::string err;
 };
 
-/// Runs `feltmap <arguments>` through the shell (quote what needs it) with empty stdin and waits for it.
-CommandResult run_feltmap(const std::string& arguments);
+/// Runs `feltmap <arguments>` through the shell (quote what needs it) with empty stdin and waits for it. `before` and
+/// `after` are pieces of shell around the command, for limits and signals.
+CommandResult run_feltmap(const std::string& arguments, const std::string& before = "", const std::string& after = "");
 
 }  // namespace felt::test
