@@ -23,6 +23,9 @@ int fail(ExitCode code, const std::string& message) {
 void add_commands(CLI::App& app) {
   app.require_subcommand(1);
   app.set_version_flag("--version", [] { return "feltmap " FELTMAP_VERSION " (SIMD: " + simd_name() + ")"; });
+  add_reconstruct(app);
+  add_info(app);
+  add_export(app);
   add_simulate(app);
   add_render(app);
   add_evaluate(app);
@@ -31,15 +34,11 @@ void add_commands(CLI::App& app) {
   add_query(app);
   add_suggest(app);
   add_friction(app);
-  add_infer(app);
-  app.footer("Each command explains itself, with an example: feltmap <command> --help");
   add_merge(app);
   add_diff(app);
   add_verify(app);
   add_infer(app);
   app.footer("Each command explains itself, with an example: feltmap <command> --help");
-  add_render(app);
-  add_evaluate(app);
 }
 
 int run(int argc, char** argv) {

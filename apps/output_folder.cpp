@@ -23,8 +23,8 @@ void prepare_output_folder(const fs::path& folder, const std::vector<std::string
   for (const std::string& name : names)
     if (fs::exists(folder / name)) in_the_way += (in_the_way.empty() ? "" : ", ") + name;
   if (!in_the_way.empty() && !overwrite)
-    throw IoError(describe_mismatch(folder.string(), "output exists", "no result there, or --overwrite to replace it",
-                                    in_the_way));
+    throw IoError(
+        describe_mismatch(folder.string(), "output exists", "no result there, or --force to replace it", in_the_way));
 }
 
 }  // namespace felt::apps

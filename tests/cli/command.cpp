@@ -20,11 +20,16 @@ std::string file_text(const std::filesystem::path& file) {
 }  // namespace
 
 CommandResult run_feltmap(const std::string& arguments, const std::string& input) {
+  return run_feltmap_within("", arguments, "", input);
+}
+
+CommandResult run_feltmap_within(const std::string& before, const std::string& arguments, const std::string& after,
+                                 const std::string& input) {
   const TemporaryDirectory directory;
   const auto in = directory.path() / "in", out = directory.path() / "out", err = directory.path() / "err";
   std::ofstream(in, std::ios::binary) << input;
-  const std::string line = felt::test::command().string() + " " + arguments + " < '" + in.string() + "' > '" +
-                           out.string() + "' 2> '" + err.string() + "'";
+  const std::string line = before + "'" + command().string() + "' " + arguments + " < '" + in.string() + "' > '" +
+                           out.string() + "' 2> '" + err.string() + "'" + after;
   const int status = std::system(line.c_str());
   CommandResult result;
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

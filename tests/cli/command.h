@@ -13,5 +13,8 @@ struct CommandResult {
 
 /// Runs `feltmap <arguments>` through the shell (quote what needs it) with `input` on stdin and waits for it.
 CommandResult run_feltmap(const std::string& arguments, const std::string& input = "");
+/// The same with pieces of shell around the command, for limits and signals.
+CommandResult run_feltmap_within(const std::string& before, const std::string& arguments, const std::string& after = "",
+                                 const std::string& input = "");
 
 }  // namespace felt::test

@@ -1,0 +1,116 @@
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "apps/command.h"
+#include "apps/commands.h"
+#include "apps/exit_code.h"
+#include "core/error.h"
+#include "io/map_file.h"
+#include "io/open_sequence.h"
+#include "mapping/crop.h"
+
+namespace felt::apps {
+namespace {
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Json classes_json(const ClassTable& table) {
+  Json classes = Json::array();
+  for (const ClassInfo& info : table.classes()) classes.push_back({{"id", info.id}, {"name", info.name}});
+  return classes;
+}
+
+Json describe_map(const fs::path& file) {
+  const Map map = load_map(file);
+  const Eigen::AlignedBox3d bounds_m = observed_bounds(map);
+  Json json;
+  json["kind"] = "map";
+  json["path"] = file.string();
+  json["file_bytes"] = fs::file_size(file);
+  json["voxel_size_m"] = map.voxel_size_m;
+  json["truncation_m"] = map.truncation_m;
+  json["blocks"] = map.store.size();
+  json["active_voxels"] = active_voxel_count(map);
+  if (!bounds_m.isEmpty())
+    json["bounds_m"] = {{"min", vector_json(bounds_m.min())}, {"max", vector_json(bounds_m.max())}};
+  json["bytes"] = {
+      {"tsdf", map.store.geometry_bytes()}, {"color", map.store.color_bytes()}, {"classes", map.store.plane_bytes()}};
+  json["frames"] = frame_count(map.frames);
+  json["classes"] = classes_json(map.classes);
+  json["map_hash"] = map_hash(map);
+  Json metadata = Json::object();
+  for (const auto& [key, value] : map.metadata) {
+    const Json parsed = Json::parse(value, nullptr, false);
+    metadata[key] = parsed.is_discarded() ? Json(value) : parsed;
+  }
+  json["metadata"] = metadata;
+  return json;
+}
+
+Json describe_sequence(const fs::path& folder, const SequenceOptions& options) {
+  const auto sequence = open_sequence(folder, options);
+  const SequenceInfo& info = sequence->info();
+  const PinholeCamera& camera = info.camera;
+  Json json;
+  json["kind"] = "sequence";
+  json["path"] = folder.string();
+  json["format"] = info.layout;
+  json["frames"] = sequence->size();
+  json["camera"] = {{"width", camera.width}, {"height", camera.height}, {"fx", camera.fx},
+                    {"fy", camera.fy},       {"cx", camera.cx},         {"cy", camera.cy}};
+  json["depth_scale"] = info.depth_scale;
+  json["pose_convention"] = info.pose_convention;
+  json["color"] = info.has_color;
+  json["labels"] = info.has_labels;
+  json["probabilities"] = info.has_probabilities;
+  json["instances"] = info.has_instances;
+  json["classes"] = classes_json(info.classes);
+  json["notes"] = info.notes;
+  return json;
+}
+
+/// "name: value" lines, nested ones indented.
+void print_lines(const Json& json, const std::string& indent) {
+  for (const auto& [key, value] : json.items()) {
+    if (value.is_object()) {
+      std::printf("%s%s:\n", indent.c_str(), key.c_str());
+      print_lines(value, indent + "  ");
+    } else {
+      std::printf("%s%s: %s\n", indent.c_str(), key.c_str(),
+                  value.is_string() ? value.get<std::string>().c_str() : value.dump().c_str());
+    }
+  }
+}
+
+int run(const fs::path& path, const SequenceOptions& options, const CommonOptions& common) {
+  if (!fs::exists(path))
+    throw IoError(describe_mismatch(path.string(), "what to describe", "a map file or a sequence", "nothing there"));
+  const bool is_map = fs::is_regular_file(path) && path.extension() == ".vdb";
+  const Json json = is_map ? describe_map(path) : describe_sequence(path, options);
+  if (common.json) {
+    std::printf("%s\n", json.dump(2).c_str());
+  } else {
+    print_lines(json, "");
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void add_info(CLI::App& app) {
+  struct Arguments {
+    fs::path path;
+    SequenceOptions options;
+    CommonOptions common;
+  };
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = add_command(
+      app, {"info", "Say what a map or a sequence holds", "feltmap info result/map.vdb\nfeltmap info recording --json"},
+      a->common, [a] { return run(a->path, a->options, a->common); });
+  command.add_option("PATH", a->path, "A map file, or a folder (or .sens file) of a recorded sequence")->required();
+  command.add_option("--format", a->options.format, "Layout of the sequence, where detection is wrong");
+}
+
+}  // namespace felt::apps

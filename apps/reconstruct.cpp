@@ -1,0 +1,184 @@
+#include <tbb/global_control.h>
+
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <future>
+#include <nlohmann/json.hpp>
+
+#include "apps/command.h"
+#include "apps/commands.h"
+#include "apps/exit_code.h"
+#include "apps/fuse_sequence.h"
+#include "apps/interrupt.h"
+#include "apps/output_folder.h"
+#include "apps/progress.h"
+#include "apps/reconstruct_options.h"
+#include "core/error.h"
+#include "core/simd.h"
+#include "io/atomic_file.h"
+#include "io/decode_ahead.h"
+#include "io/map_file.h"
+#include "io/mesh_io.h"
+#include "io/open_sequence.h"
+#include "io/system_memory.h"
+#include "mapping/marching_cubes.h"
+#include "mapping/size_estimate.h"
+
+namespace felt::apps {
+namespace {
+namespace fs = std::filesystem;
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+constexpr const char* kMapName = "map.vdb";
+constexpr const char* kMeshName = "mesh.ply";
+constexpr const char* kReportName = "report.json";
+
+std::string gigabytes(double bytes) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g GB", bytes / 1e9);
+  return text;
+}
+
+/// Refuses a map that cannot fit. Frames are decoded for this only where the worst case would not fit.
+void check_memory(const SequenceReader& sequence, const ReconstructOptions& options) {
+  const MapResolution resolution{options.voxel_size_m, options.truncation_m, options.reading.read_color};
+  const auto available = double(available_memory_bytes());
+  const auto bytes_of = [&](double area_m2) {
+    return estimated_bytes(blocks_near_surface(area_m2, resolution), resolution);
+  };
+  const double most_m2 =
+      double(sequence.size()) * largest_area_in_view_m2(sequence.info().camera, options.fusion.max_depth_m);
+  if (bytes_of(most_m2) <= available) return;
+
+  // Coarse enough that every 4th pixel fills the cells of a surface at a few metres.
+  SurfaceEstimate surface(std::max(0.05, options.voxel_size_m * kBlockDim));
+  constexpr int64_t kSamples = 8;
+  for (int64_t i = 0; i < sequence.size(); i += std::max<int64_t>(1, sequence.size() / kSamples)) {
+    const ReadResult result = sequence.read(i);
+    if (const auto* frame = std::get_if<Frame>(&result))
+      surface.add(*frame, options.fusion.min_depth_m, options.fusion.max_depth_m);
+  }
+  if (bytes_of(surface.area_m2()) <= available) return;
+  char area[32];
+  std::snprintf(area, sizeof area, "%.3g m^2", surface.area_m2());
+  throw ConfigError(describe_mismatch("--voxel-size " + nlohmann::json(options.voxel_size_m).dump(),
+                                      "memory for the " + std::string(area) + " of surface in sampled frames",
+                                      "at most the " + gigabytes(available) + " available",
+                                      "an estimate of " + gigabytes(bytes_of(surface.area_m2()))));
+}
+
+/// Working memory that must stay free to mesh and save what is fused.
+bool memory_runs_out(const Map& map) {
+  const MapResolution resolution{map.voxel_size_m, map.truncation_m, map.store.color_bytes() > 0};
+  const auto held = double(map.store.geometry_bytes() + map.store.color_bytes());
+  return double(available_memory_bytes()) < estimated_bytes(double(map.store.size()), resolution) - held + 64e6;
+}
+
+FusionRecord fuse(const SequenceReader& sequence, Map& map, const ReconstructOptions& options,
+                  const CommonOptions& common, const InterruptGuard& interrupt) {
+  ProgressBar progress("frames", sequence.size(), !common.quiet);
+  DecodeAhead frames(sequence, {.threads = common.thread_count()});
+  FusionRecord record = fuse_sequence(frames, map, options.fusion, [&](const FusionRecord& so_far) -> std::string {
+    progress.update(so_far.read);
+    if (interrupt.requested()) return "interrupted";
+    constexpr int64_t kMemoryCheckEvery = 32;
+    if (so_far.read % kMemoryCheckEvery == 0 && memory_runs_out(map)) return "out of memory";
+    return {};
+  });
+  record.decode_s = frames.decode_s();
+  record.wait_s = frames.wait_s();
+  return record;
+}
+
+/// Map file and mesh, side by side. The map is what cannot be made again: a mesh that fails does not stop its saving.
+void write_results(const Map& map, const fs::path& folder, int threads, ReconstructReport& report) {
+  auto saving = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&] {
+    const auto start = Clock::now();
+    save_map(map, folder / kMapName);
+    report.save_s = seconds_since(start);
+  });
+  std::exception_ptr mesh_failure;
+  try {
+    const auto start = Clock::now();
+    const TriangleMesh mesh = extract_mesh(map);
+    write_ply(folder / kMeshName, mesh);
+    report.mesh_vertices = mesh.positions.size();
+    report.mesh_triangles = mesh.triangles.size();
+    report.mesh_s = seconds_since(start);
+    report.map_hash = map_hash(map);
+  } catch (...) {
+    mesh_failure = std::current_exception();
+  }
+  saving.get();
+  if (mesh_failure) std::rethrow_exception(mesh_failure);
+}
+
+void print_summary(const ReconstructReport& report, const fs::path& folder) {
+  const FusionRecord& fusion = report.fusion;
+  std::printf("%lld of %lld frames fused in %.2f s: %zu blocks, %zu voxels; mesh of %zu triangles\n",
+              static_cast<long long>(fusion.fused), static_cast<long long>(fusion.read), report.total_s, report.blocks,
+              report.active_voxels, report.mesh_triangles);
+  for (const auto& [reason, count] : fusion.skipped)
+    std::printf("  skipped %lld: %s\n", static_cast<long long>(count), reason.c_str());
+  for (const char* name : {kMapName, kMeshName, kReportName}) std::printf("  %s\n", (folder / name).c_str());
+}
+
+int run(const ReconstructArguments& arguments, CommonOptions common) {
+  const auto start = Clock::now();
+  const ReconstructOptions options = resolve(arguments, common.threads);
+  common.threads = options.threads;
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(common.thread_count()));
+  const auto sequence = open_sequence(options.sequence, options.reading);
+  prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite);
+  check_memory(*sequence, options);
+
+  ReconstructReport report;
+  Map map(options.voxel_size_m, options.truncation_m);
+  map.classes = sequence->info().classes;
+  const InterruptGuard interrupt;
+  report.fusion = fuse(*sequence, map, options, common, interrupt);
+
+  const nlohmann::ordered_json config = to_json(options);
+  map.metadata["config"] = config.dump();
+  write_results(map, options.out, common.thread_count(), report);
+  report.voxel_size_m = options.voxel_size_m, report.truncation_m = options.truncation_m;
+  report.blocks = map.store.size();
+  report.active_voxels = active_voxel_count(map);
+  report.tsdf_bytes = map.store.geometry_bytes(), report.color_bytes = map.store.color_bytes();
+  report.class_bytes = map.store.plane_bytes();
+  report.threads = common.thread_count();
+  report.simd = simd_name();
+  report.peak_rss_bytes = peak_resident_bytes();
+  report.total_s = seconds_since(start);
+  const std::string json = to_json(report, config).dump(2) + "\n";
+  write_file_atomically(options.out / kReportName, json);
+
+  if (common.json) {
+    std::fputs(json.c_str(), stdout);
+  } else if (!common.quiet) {
+    print_summary(report, options.out);
+  }
+  const FusionRecord& fusion = report.fusion;
+  if (fusion.stopped.empty()) return kDone;
+  std::fprintf(stderr, "feltmap: %s after %lld of %lld frames: what was fused is saved in %s\n", fusion.stopped.c_str(),
+               static_cast<long long>(fusion.read), static_cast<long long>(sequence->size()), options.out.c_str());
+  return kInterrupted;
+}
+
+}  // namespace
+
+void add_reconstruct(CLI::App& app) {
+  auto common = std::make_shared<CommonOptions>();
+  auto arguments = std::make_shared<ReconstructArguments>();
+  CLI::App& command = add_command(app,
+                                  {"reconstruct", "Fuse a recorded RGB-D sequence into a map, a mesh and a report",
+                                   "feltmap reconstruct recording --out result --voxel-size 0.02\n"
+                                   "feltmap reconstruct rgbd_dataset_freiburg1_rpy --out result --frames 0:200:2"},
+                                  *common, [arguments, common] { return run(*arguments, *common); });
+  add_reconstruct_options(command, *arguments);
+}
+
+}  // namespace felt::apps

@@ -1,0 +1,202 @@
+#include "apps/reconstruct_options.h"
+
+#include <cmath>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "core/error.h"
+#include "io/reconstruct_config.h"
+
+namespace felt::apps {
+namespace {
+
+template <typename Enum>
+using Names = std::map<std::string, Enum>;
+
+const Names<DistanceModel> kDistances = {{"optical-axis", DistanceModel::optical_axis},
+                                         {"ray", DistanceModel::ray},
+                                         {"tangent-plane", DistanceModel::tangent_plane}};
+const Names<WeightModel> kWeights = {{"constant", WeightModel::constant},
+                                     {"inverse-square", WeightModel::inverse_square},
+                                     {"sensor-noise", WeightModel::sensor_noise}};
+
+template <typename Enum>
+std::string name_of(const Names<Enum>& names, Enum value) {
+  for (const auto& [name, candidate] : names)
+    if (candidate == value) return name;
+  return {};
+}
+
+std::string text_of(double number) {
+  std::ostringstream text;
+  text << number;
+  return text.str();
+}
+
+/// The double that a person would write for a float: 0.1, not 0.10000000149.
+double short_decimal(float value) { return std::stod(text_of(value)); }
+
+/// Runs checks one after the other and keeps what they found.
+class Problems {
+public:
+  void attempt(const std::function<void()>& step) {
+    try {
+      step();
+    } catch (const ConfigError& e) {
+      messages_.emplace_back(e.what());
+    }
+  }
+  void expect(bool good, const std::string& where, const std::string& what, const std::string& expected,
+              const std::string& found) {
+    if (!good) messages_.push_back(describe_mismatch(where, what, expected, found));
+  }
+  void throw_if_any() const {
+    if (!messages_.empty()) throw ConfigError(messages_);
+  }
+
+private:
+  std::vector<std::string> messages_;
+};
+
+bool positive(double value) { return std::isfinite(value) && value > 0; }
+
+}  // namespace
+
+void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
+  command.add_option("SEQUENCE", a.sequence, "Folder of a recorded RGB-D sequence, or a .sens file")->required();
+  command.add_option("--out", a.out, "Folder for map.vdb, mesh.ply and report.json")->required();
+  command.add_flag("--force", a.overwrite, "Replace results that exist there, each when the new one is whole");
+  command.add_option("--config", a.config, "YAML file with any of these settings; the command line wins")
+      ->option_text("FILE");
+
+  const char* map = "Map";
+  command.add_option("--voxel-size", a.voxel_size_m, "Edge of a voxel, metres [0.02]")->group(map);
+  command.add_option("--truncation", a.truncation, "Band around the surface: metres, or voxels as 4vox [4vox]")
+      ->group(map);
+  command.add_option("--min-depth", a.min_depth_m, "Nearer depth is not used, metres [0.1]")->group(map);
+  command.add_option("--max-depth", a.max_depth_m, "Farther depth is not used, metres [4]")->group(map);
+  command.add_option("--distance", a.distance, "Signed distance along: optical-axis, ray or tangent-plane")
+      ->transform(CLI::CheckedTransformer(kDistances).description(""))
+      ->group(map);
+  command.add_option("--weight", a.weight, "Weight of a measurement: constant, inverse-square or sensor-noise")
+      ->transform(CLI::CheckedTransformer(kWeights).description(""))
+      ->group(map);
+  command.add_option("--max-weight", a.max_weight, "Cap of a voxel's summed weight")->group(map);
+  command.add_flag("--carve", a.carve, "Let free space seen later erase what stood there")->group(map);
+
+  const char* reading = "Sequence (found in it, or the layout's default, unless given)";
+  command.add_option("--format", a.format, "Layout: 7scenes, tum, replica, generic, ...")->group(reading);
+  command.add_option("--frames", a.frames, "Frames a:b:step in recorded order, counted from 0")->group(reading);
+  command.add_option("--intrinsics", a.intrinsics, "fx,fy,cx,cy of the depth image, pixels")->group(reading);
+  command.add_option("--depth-scale", a.depth_scale, "Stored depth units per metre")->group(reading);
+  command.add_option("--depth-encoding", a.depth_encoding, "plain, or rotated3 (16 bits rotated left by 3)")
+      ->group(reading);
+  command.add_flag("--ray-length", a.ray_length, "Depth is the length of the ray, not z")->group(reading);
+  command.add_option("--pose-convention", a.pose_convention, "c2w or w2c, opencv or opengl; for example w2c,opengl")
+      ->group(reading);
+  command.add_option("--max-dt", a.max_dt_s, "Largest difference of stamps within a frame, seconds")->group(reading);
+  command.add_option("--labels", a.labels, "Folder of label images")->group(reading);
+  command.add_option("--probs", a.probs, "Folder of class probability images")->group(reading);
+  command.add_option("--classes", a.classes, "Class table (classes.yaml)")->group(reading);
+  command.add_flag("--no-color", a.no_color, "Do not read colour images")->group(reading);
+}
+
+ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
+  ReconstructOptions options;
+  Problems problems;
+  ReconstructConfig file;
+  if (!a.config.empty()) problems.attempt([&] { file = read_reconstruct_config(a.config); });
+  options.sequence = a.sequence, options.out = a.out, options.overwrite = a.overwrite;
+  options.threads = threads > 0 ? threads : file.threads.value_or(0);
+
+  SequenceOptions& reading = options.reading;
+  reading.format = a.format.empty() ? file.format.value_or("") : a.format;
+  reading.labels_dir = a.labels.empty() ? file.labels : a.labels;
+  reading.probs_dir = a.probs.empty() ? file.probs : a.probs;
+  reading.classes_file = a.classes.empty() ? file.classes : a.classes;
+  reading.intrinsics = file.intrinsics;
+  reading.pose_convention = file.pose_convention;
+  reading.depth_encoding = file.depth_encoding;
+  reading.frames = file.frames.value_or(reading.frames);
+  if (!a.frames.empty()) problems.attempt([&] { reading.frames = parse_frame_selection(a.frames, "--frames"); });
+  if (!a.intrinsics.empty())
+    problems.attempt([&] { reading.intrinsics = parse_intrinsics(a.intrinsics, "--intrinsics"); });
+  if (!a.pose_convention.empty())
+    problems.attempt([&] { reading.pose_convention = parse_pose_convention(a.pose_convention, "--pose-convention"); });
+  if (!a.depth_encoding.empty())
+    problems.attempt([&] { reading.depth_encoding = parse_depth_encoding(a.depth_encoding, "--depth-encoding"); });
+  reading.depth_scale = a.depth_scale ? a.depth_scale : file.depth_scale;
+  reading.depth_is_ray_length = a.ray_length ? std::optional(true) : file.ray_length;
+  reading.max_dt_s = a.max_dt_s.value_or(file.max_dt_s.value_or(reading.max_dt_s));
+  reading.read_color = !a.no_color && file.color.value_or(true);
+  if (reading.depth_scale)
+    problems.expect(positive(*reading.depth_scale), "--depth-scale", "depth units per metre", "a number above 0",
+                    text_of(*reading.depth_scale));
+  problems.expect(positive(reading.max_dt_s), "--max-dt", "seconds", "a number above 0", text_of(reading.max_dt_s));
+
+  options.voxel_size_m = a.voxel_size_m.value_or(file.voxel_size_m.value_or(options.voxel_size_m));
+  problems.expect(positive(options.voxel_size_m), "--voxel-size", "edge of a voxel in metres", "a number above 0",
+                  text_of(options.voxel_size_m));
+  problems.attempt([&] {
+    const std::string truncation = a.truncation.empty() ? file.truncation.value_or("4vox") : a.truncation;
+    options.truncation_m = parse_truncation(truncation, options.voxel_size_m, "--truncation");
+    if (positive(options.voxel_size_m) && !(options.truncation_m >= options.voxel_size_m))
+      throw ConfigError(describe_mismatch("--truncation", "band around the surface", "at least one voxel",
+                                          text_of(options.truncation_m) + " m"));
+  });
+
+  IntegrationConfig& fusion = options.fusion;
+  const auto choose = [](float& value, const std::optional<double>& line, const std::optional<double>& from_file) {
+    if (line || from_file) value = float(line ? *line : *from_file);
+  };
+  choose(fusion.min_depth_m, a.min_depth_m, file.min_depth_m);
+  choose(fusion.max_depth_m, a.max_depth_m, file.max_depth_m);
+  choose(fusion.max_weight, a.max_weight, file.max_weight);
+  choose(fusion.dropoff_start_vox, std::nullopt, file.dropoff_start_vox);
+  fusion.distance = a.distance.value_or(file.distance.value_or(fusion.distance));
+  fusion.weight = a.weight.value_or(file.weight.value_or(fusion.weight));
+  fusion.carve = a.carve || file.carve.value_or(fusion.carve);
+  problems.expect(std::isfinite(fusion.min_depth_m) && fusion.min_depth_m >= 0, "--min-depth", "metres",
+                  "a number of at least 0", text_of(fusion.min_depth_m));
+  problems.expect(std::isfinite(fusion.max_depth_m) && fusion.max_depth_m > fusion.min_depth_m, "--max-depth", "metres",
+                  "a number above the smallest depth, " + text_of(fusion.min_depth_m), text_of(fusion.max_depth_m));
+  problems.expect(fusion.max_weight >= 1, "--max-weight", "summed weight", "a number of at least 1",
+                  text_of(fusion.max_weight));
+  problems.throw_if_any();
+  return options;
+}
+
+nlohmann::ordered_json to_json(const ReconstructOptions& options) {
+  const SequenceOptions& reading = options.reading;
+  const IntegrationConfig& fusion = options.fusion;
+  nlohmann::ordered_json json;
+  json["sequence"] = options.sequence.string();
+  if (!reading.format.empty()) json["format"] = reading.format;
+  json["frames"] = to_string(reading.frames);
+  if (reading.intrinsics) {
+    const Intrinsics& k = *reading.intrinsics;
+    json["intrinsics"] = {k.fx, k.fy, k.cx, k.cy};
+  }
+  if (reading.depth_scale) json["depth_scale"] = *reading.depth_scale;
+  if (reading.pose_convention) json["pose_convention"] = to_string(*reading.pose_convention);
+  if (reading.depth_encoding == DepthEncoding::rotated3) json["depth_encoding"] = "rotated3";
+  if (reading.depth_is_ray_length) json["ray_length"] = *reading.depth_is_ray_length;
+  if (!reading.labels_dir.empty()) json["labels"] = reading.labels_dir.string();
+  if (!reading.probs_dir.empty()) json["probs"] = reading.probs_dir.string();
+  if (!reading.classes_file.empty()) json["classes"] = reading.classes_file.string();
+  json["max_dt_s"] = reading.max_dt_s;
+  json["color"] = reading.read_color;
+  json["voxel_size_m"] = options.voxel_size_m;
+  json["truncation_m"] = options.truncation_m;
+  json["min_depth_m"] = short_decimal(fusion.min_depth_m);
+  json["max_depth_m"] = short_decimal(fusion.max_depth_m);
+  json["distance"] = name_of(kDistances, fusion.distance);
+  json["weight"] = name_of(kWeights, fusion.weight);
+  json["max_weight"] = short_decimal(fusion.max_weight);
+  json["dropoff_start_vox"] = short_decimal(fusion.dropoff_start_vox);
+  json["carve"] = fusion.carve;
+  return json;
+}
+
+}  // namespace felt::apps

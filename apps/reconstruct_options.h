@@ -1,0 +1,43 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "io/sequence_options.h"
+#include "mapping/integration_config.h"
+
+namespace felt::apps {
+
+/// Everything that `reconstruct` can be told, checked.
+struct ReconstructOptions {
+  std::filesystem::path sequence, out;
+  SequenceOptions reading;
+  double voxel_size_m = 0.02;
+  double truncation_m = 0.08;
+  IntegrationConfig fusion;
+  bool overwrite = false;
+  int threads = 0;  ///< 0: all hardware threads
+};
+
+/// The command line's own words. What is left empty keeps the default or the configuration file's value.
+struct ReconstructArguments {
+  std::filesystem::path config, sequence, out, labels, probs, classes;
+  std::string format, intrinsics, pose_convention, depth_encoding, frames, truncation;
+  std::optional<double> depth_scale, max_dt_s, voxel_size_m, min_depth_m, max_depth_m, max_weight;
+  std::optional<DistanceModel> distance;
+  std::optional<WeightModel> weight;
+  bool ray_length = false, no_color = false, carve = false, overwrite = false;
+};
+
+void add_reconstruct_options(CLI::App& command, ReconstructArguments& arguments);
+
+/// Defaults, then the configuration file, then the command line (`threads`: its --threads, 0 where not given); checked
+/// together. Throws ConfigError with every problem at once.
+ReconstructOptions resolve(const ReconstructArguments& arguments, int threads);
+
+/// The settings as used, for the report and the map.
+nlohmann::ordered_json to_json(const ReconstructOptions& options);
+
+}  // namespace felt::apps

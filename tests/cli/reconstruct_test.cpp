@@ -1,0 +1,285 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "tests/cli/command.h"
+#include "tests/support/data.h"
+
+namespace felt::test {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::string quoted(const fs::path& path) { return "'" + path.string() + "'"; }
+
+std::string file_text(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+/// Twelve small views of boxes on a floor, made once.
+const fs::path& boxes() {
+  static const TemporaryDirectory directory;
+  static const fs::path sequence = directory.path() / "boxes";
+  if (!fs::exists(sequence)) {
+    const CommandResult made = run_feltmap("simulate boxes --out " + quoted(sequence) +
+                                           " --frames 12 --width 160 --height 120 --no-mesh --quiet");
+    INFO(made.err);
+    REQUIRE(made.exit_code == 0);
+  }
+  return sequence;
+}
+
+CommandResult reconstruct(const fs::path& sequence, const fs::path& out, const std::string& options = "") {
+  return run_feltmap("reconstruct " + quoted(sequence) + " --out " + quoted(out) + " --quiet " + options);
+}
+
+/// Built beside the command's own folder: build/<preset>/tests.
+fs::path stock_vdb_reader() { return command().parent_path().parent_path() / "tests" / "stock_vdb_reader"; }
+
+size_t line_count(const std::string& text) { return size_t(std::count(text.begin(), text.end(), '\n')); }
+
+/// A copy of `boxes` that takes seconds: the same twelve frames many times over, as links.
+fs::path long_sequence(const fs::path& folder) {
+  constexpr int kRounds = 600;
+  fs::create_directories(folder);
+  fs::copy(boxes() / "sequence.yaml", folder / "sequence.yaml");
+  for (const char* channel : {"color", "depth"}) {
+    fs::create_directory(folder / channel);
+    for (const auto& image : fs::directory_iterator(boxes() / channel)) {
+      const int number = std::stoi(image.path().stem().string());
+      for (int round = 0; round < kRounds; ++round)
+        fs::create_symlink(
+            image.path(), folder / channel / (std::to_string(number + 12 * round) + image.path().extension().string()));
+    }
+  }
+  std::ifstream recorded(boxes() / "poses.txt");
+  std::vector<std::string> poses;
+  for (std::string line; std::getline(recorded, line);)
+    if (!line.empty() && line[0] != '#') poses.push_back(line.substr(line.find(' ')));
+  REQUIRE(poses.size() == 12);
+  std::ofstream all(folder / "poses.txt");
+  for (int i = 0; i < 12 * kRounds; ++i) all << i << poses[size_t(i % 12)] << '\n';
+  return folder;
+}
+
+}  // namespace
+
+TEST_CASE("reconstruct writes a map, a mesh and a report that holds every promised key") {
+  const TemporaryDirectory out;
+  const CommandResult result = reconstruct(boxes(), out.path() / "result", "--json --threads 2 --frames 0:12:2");
+  INFO(result.err);
+  REQUIRE(result.exit_code == 0);
+  CHECK(result.err.empty());
+  const json report = json::parse(result.out);
+  CHECK(report == json::parse(file_text(out.path() / "result/report.json")));
+
+  CHECK(report.at("frames").at("read") == 6);
+  CHECK(report.at("frames").at("fused") == 6);
+  CHECK(report.at("frames").at("skipped").empty());
+  CHECK(report.at("voxel_size_m") == 0.02);
+  CHECK(report.at("truncation_m") == 0.08);
+  CHECK(report.at("blocks") > 100);
+  CHECK(report.at("active_voxels") > 512 * 10);
+  const json& bytes = report.at("bytes");
+  CHECK(bytes.at("tsdf").get<size_t>() >= 4096 * report.at("blocks").get<size_t>());
+  CHECK(bytes.at("total").get<size_t>() == bytes.at("tsdf").get<size_t>() + bytes.at("color").get<size_t>() +
+                                               bytes.at("classes").get<size_t>() +
+                                               bytes.at("properties").get<size_t>());
+  CHECK(report.at("peak_rss_bytes") > bytes.at("total"));
+  const json& time = report.at("time_s");
+  for (const char* key : {"decode", "allocate", "fuse", "mesh", "save"}) {
+    INFO(key);
+    CHECK(time.at(key) > 0);
+    CHECK(time.at(key).get<double>() < 2 * time.at("total").get<double>());
+  }
+  const json& fuse_ms = report.at("fuse_ms");
+  CHECK(fuse_ms.at("mean") > 0);
+  CHECK(fuse_ms.at("p50") <= fuse_ms.at("p95"));
+  CHECK(report.at("threads") == 2);
+  CHECK(report.at("simd").is_string());
+  CHECK(report.at("map_hash").get<std::string>().size() == 32);
+  CHECK(report.at("mesh").at("vertices") > 1000);
+  CHECK(report.at("mesh").at("triangles") > 1000);
+  CHECK(report.at("config").at("frames") == "0:12:2");
+
+  const std::string mesh = file_text(out.path() / "result/mesh.ply");
+  CHECK_THAT(mesh, Catch::Matchers::StartsWith("ply\n"));
+  CHECK_THAT(mesh, Catch::Matchers::Contains("element vertex " + report["mesh"]["vertices"].dump() + "\n"));
+}
+
+TEST_CASE("a program that knows only OpenVDB reads the grids of a map") {
+  const TemporaryDirectory out;
+  const CommandResult made = reconstruct(boxes(), out.path(), "--json");
+  REQUIRE(made.exit_code == 0);
+  const json report = json::parse(made.out);
+  const fs::path listing = out.path() / "grids.txt";
+  REQUIRE(std::system(
+              (quoted(stock_vdb_reader()) + " " + quoted(out.path() / "map.vdb") + " > " + quoted(listing)).c_str()) ==
+          0);
+  std::ifstream lines(listing);
+  std::map<std::string, std::string> grids;
+  for (std::string name, rest; lines >> name && std::getline(lines, rest);) grids[name] = rest;
+
+  std::istringstream tsdf(grids.at("tsdf"));
+  std::string type, grid_class;
+  size_t active = 0;
+  double voxel_m = 0, least = 0, greatest = 0;
+  tsdf >> type >> grid_class >> active >> voxel_m >> least >> greatest;
+  CHECK(type == "float");
+  CHECK(grid_class == "level set");
+  CHECK(active == report.at("active_voxels").get<size_t>());
+  CHECK(voxel_m == Approx(0.02));
+  CHECK(least >= -0.0801);
+  CHECK(least < -0.02);
+  CHECK(greatest <= 0.0801);
+  CHECK_THAT(grids.at("weight"), Catch::Matchers::StartsWith(" float unknown " + std::to_string(active)));
+  CHECK_THAT(grids.at("color"), Catch::Matchers::StartsWith(" vec3s "));
+}
+
+TEST_CASE("the map has the same hash on 1, 2, 3 and 8 threads") {
+  std::set<std::string> hashes;
+  for (const char* threads : {"1", "2", "3", "8"}) {
+    const TemporaryDirectory out;
+    const CommandResult result = reconstruct(boxes(), out.path(), std::string("--json --threads ") + threads);
+    REQUIRE(result.exit_code == 0);
+    hashes.insert(json::parse(result.out).at("map_hash").get<std::string>());
+  }
+  CHECK(hashes.size() == 1);
+}
+
+TEST_CASE("results that exist are refused before any work, and replaced with --force") {
+  const TemporaryDirectory out;
+  std::ofstream(out.path() / "map.vdb") << "precious";
+  const CommandResult refused = reconstruct(boxes(), out.path());
+  CHECK(refused.exit_code == 4);
+  CHECK(line_count(refused.err) == 1);
+  CHECK_THAT(refused.err, Catch::Matchers::Contains("map.vdb") && Catch::Matchers::Contains("--force"));
+  CHECK(file_text(out.path() / "map.vdb") == "precious");
+  CHECK_FALSE(fs::exists(out.path() / "mesh.ply"));
+
+  CHECK(reconstruct(boxes(), out.path(), "--force").exit_code == 0);
+  CHECK(file_text(out.path() / "map.vdb") != "precious");
+}
+
+TEST_CASE("every setting that cannot be used is named at once, with exit code 3") {
+  const TemporaryDirectory out;
+  const CommandResult result =
+      reconstruct(boxes(), out.path() / "result",
+                  "--voxel-size 0 --max-depth -1 --frames 5:2 --truncation wide --intrinsics 1,2,3 --depth-scale nan");
+  CHECK(result.exit_code == 3);
+  for (const char* option :
+       {"--voxel-size", "--max-depth", "--frames", "--truncation", "--intrinsics", "--depth-scale"}) {
+    INFO(option << " in\n" << result.err);
+    CHECK(result.err.find(option) != std::string::npos);
+  }
+  CHECK(line_count(result.err) == 6);
+  CHECK_FALSE(fs::exists(out.path() / "result"));
+  for (const char* size : {"-0.02", "nan", "inf"}) {
+    INFO(size);
+    CHECK(reconstruct(boxes(), out.path() / "result", std::string("--voxel-size ") + size).exit_code == 3);
+  }
+}
+
+TEST_CASE("a map that would not fit into memory is refused with the estimate") {
+  const TemporaryDirectory out;
+  const CommandResult result = reconstruct(boxes(), out.path(), "--voxel-size 0.00002");
+  CHECK(result.exit_code == 3);
+  CHECK(line_count(result.err) == 1);
+  CHECK_THAT(result.err, Catch::Matchers::Contains("memory") && Catch::Matchers::Contains("GB available"));
+  CHECK(fs::is_empty(out.path()));
+}
+
+TEST_CASE("an input that is not there or no sequence exits with 4 and one line") {
+  const TemporaryDirectory folder;
+  fs::create_directory(folder.path() / "empty");
+  for (const char* name : {"absent", "empty"}) {
+    INFO(name);
+    const CommandResult result = reconstruct(folder.path() / name, folder.path() / "out");
+    CHECK(result.exit_code == 4);
+    CHECK(line_count(result.err) == 1);
+    CHECK_THAT(result.err, Catch::Matchers::Contains(name));
+  }
+}
+
+TEST_CASE("a full disk exits with 4 and leaves the earlier result as it was") {
+  const TemporaryDirectory out;
+  REQUIRE(reconstruct(boxes(), out.path()).exit_code == 0);
+  const std::string map = file_text(out.path() / "map.vdb"), mesh = file_text(out.path() / "mesh.ply");
+  // A limit on the size of files stands for the full disk: writing fails in the same way, at the same places.
+  const CommandResult result =
+      run_feltmap_within("trap '' XFSZ; ulimit -f 64; ", "reconstruct " + quoted(boxes()) + " --out " +
+                                                             quoted(out.path()) + " --force --voxel-size 0.01 --quiet");
+  CHECK(result.exit_code == 4);
+  CHECK(line_count(result.err) == 1);
+  CHECK(file_text(out.path() / "map.vdb") == map);
+  CHECK(file_text(out.path() / "mesh.ply") == mesh);
+  size_t files = 0;
+  for ([[maybe_unused]] const auto& entry : fs::directory_iterator(out.path())) ++files;
+  CHECK(files == 3);
+}
+
+TEST_CASE("a signal saves what is fused, says so and exits with 5") {
+  const TemporaryDirectory folder;
+  const fs::path sequence = long_sequence(folder.path() / "long"), out = folder.path() / "out";
+  for (const char* signal : {"INT", "TERM"}) {
+    INFO(signal);
+    fs::remove_all(out);
+    const CommandResult result =
+        run_feltmap_within("", "reconstruct " + quoted(sequence) + " --out " + quoted(out) + " --quiet",
+                           std::string(" & sleep 0.5; kill -") + signal + " $!; wait $!");
+    CHECK(result.exit_code == 5);
+    CHECK_THAT(result.err, Catch::Matchers::Contains("interrupted") && Catch::Matchers::Contains("saved"));
+    const json report = json::parse(file_text(out / "report.json"));
+    CHECK(report.at("frames").at("fused") > 0);
+    CHECK(report.at("frames").at("fused") < 7200);
+    CHECK(report.at("stopped") == "interrupted");
+    const CommandResult info = run_feltmap("info --json " + quoted(out / "map.vdb"));
+    REQUIRE(info.exit_code == 0);
+    CHECK(json::parse(info.out).at("map_hash") == report.at("map_hash"));
+  }
+}
+
+TEST_CASE("frames that cannot be used are skipped and counted by reason") {
+  const TemporaryDirectory folder;
+  const fs::path sequence = folder.path() / "broken";
+  fs::copy(boxes(), sequence, fs::copy_options::recursive);
+  std::vector<fs::path> depth;
+  for (const auto& entry : fs::directory_iterator(sequence / "depth")) depth.push_back(entry.path());
+  std::sort(depth.begin(), depth.end());
+  fs::resize_file(depth[3], fs::file_size(depth[3]) / 2);
+  fs::remove(depth[5]);
+  const CommandResult result = reconstruct(sequence, folder.path() / "out", "--json");
+  INFO(result.err);
+  REQUIRE(result.exit_code == 0);
+  const json frames = json::parse(result.out).at("frames");
+  int64_t skipped = 0;
+  for (const auto& [reason, count] : frames.at("skipped").items()) skipped += count.get<int64_t>();
+  CHECK(frames.at("fused").get<int64_t>() + skipped == frames.at("read").get<int64_t>());
+  CHECK(frames.at("fused") == 10);
+  CHECK(skipped >= 1);
+}
+
+TEST_CASE("info describes a map and a sequence") {
+  const TemporaryDirectory out;
+  const CommandResult made = reconstruct(boxes(), out.path(), "--json");
+  REQUIRE(made.exit_code == 0);
+  const json report = json::parse(made.out);
+  const json map = json::parse(run_feltmap("info --json " + quoted(out.path() / "map.vdb")).out);
+  CHECK(map.at("kind") == "map");
+  for (const char* key : {"map_hash", "voxel_size_m", "active_voxels"}) CHECK(map.at(key) == report.at(key));
+  const json sequence = json::parse(run_feltmap("info --json " + quoted(boxes())).out);
+  CHECK(sequence.at("kind") == "sequence");
+  CHECK(sequence.at("frames") == 12);
+  CHECK(sequence.at("camera").at("width") == 160);
+  CHECK(run_feltmap("info " + quoted(out.path() / "absent.vdb")).exit_code == 4);
+}
+
+}  // namespace felt::test
