@@ -93,6 +93,17 @@ FusionRecord fuse(const SequenceReader& sequence, Map& map, const ReconstructOpt
   return record;
 }
 
+/// "3 frames: 2 missing pose, 1 truncated depth image".
+std::string nothing_fused(const FusionRecord& record) {
+  std::string text = std::to_string(record.read) + " frames";
+  const char* separator = ": ";
+  for (const auto& [reason, count] : record.skipped) {
+    text += separator + std::to_string(count) + ' ' + reason;
+    separator = ", ";
+  }
+  return text;
+}
+
 /// Map file and mesh, side by side. The map is what cannot be made again: a mesh that fails does not stop its saving.
 void write_results(const Map& map, const fs::path& folder, int threads, ReconstructReport& report) {
   auto saving = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&] {
@@ -140,6 +151,9 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   map.classes = sequence->info().classes;
   const InterruptGuard interrupt;
   report.fusion = fuse(*sequence, map, options, common, interrupt);
+  if (report.fusion.fused == 0 && report.fusion.stopped.empty())
+    throw FormatError(describe_mismatch(options.sequence.string(), "frames", "at least one that can be fused",
+                                        nothing_fused(report.fusion)));
 
   const nlohmann::ordered_json config = to_json(options);
   map.metadata["config"] = config.dump();

@@ -267,6 +267,20 @@ TEST_CASE("frames that cannot be used are skipped and counted by reason") {
   CHECK(skipped >= 1);
 }
 
+TEST_CASE("a sequence without one usable frame writes nothing and says why") {
+  const TemporaryDirectory folder;
+  const fs::path sequence = folder.path() / "broken";
+  fs::copy(boxes(), sequence, fs::copy_options::recursive);
+  for (const auto& entry : fs::directory_iterator(sequence / "depth")) {
+    if (entry.path().stem() != "000000") fs::resize_file(entry.path(), 40);
+  }
+  const CommandResult result = reconstruct(sequence, folder.path() / "out", "--frames 1:");
+  CHECK(result.exit_code == 4);
+  CHECK(line_count(result.err) == 1);
+  CHECK_THAT(result.err, Catch::Matchers::Contains("11 frames"));
+  CHECK_FALSE(fs::exists(folder.path() / "out/map.vdb"));
+}
+
 TEST_CASE("info describes a map and a sequence") {
   const TemporaryDirectory out;
   const CommandResult made = reconstruct(boxes(), out.path(), "--json");
