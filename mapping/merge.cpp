@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "mapping/touch_update.h"
 #include "mapping/tsdf_kernels.h"
 
 namespace felt {
@@ -17,6 +18,13 @@ const ClassTable& common_classes(std::span<const Map* const> maps) {
   for (const Map* map : maps)
     if (!map->classes.empty()) return map->classes;
   return maps.front()->classes;
+}
+
+/// Property table of the result, likewise.
+const PropertyTable& common_properties(std::span<const Map* const> maps) {
+  for (const Map* map : maps)
+    if (!map->properties.empty()) return map->properties;
+  return maps.front()->properties;
 }
 
 void require_mergeable(std::span<const Map* const> maps, const MergeOptions& options) {
@@ -32,6 +40,8 @@ void require_mergeable(std::span<const Map* const> maps, const MergeOptions& opt
                                            in_millimetres(maps[i]->truncation_m)));
     if (!maps[i]->classes.empty() && !(maps[i]->classes == classes))
       problems.push_back(describe_mismatch(where, "class table", "the same in all maps", "another"));
+    if (!maps[i]->properties.empty() && !(maps[i]->properties == common_properties(maps)))
+      problems.push_back(describe_mismatch(where, "property table", "the same in all maps", "another"));
     for (size_t j = 0; j < i && !options.allow_shared_frames; ++j)
       if (const auto shared = shared_frames(maps[j]->frames, maps[i]->frames); !shared.empty())
         problems.push_back(describe_mismatch(where, "frames", "none of those of map " + std::to_string(j + 1),
@@ -128,11 +138,13 @@ Map merge(std::span<const Map* const> maps, const MergeOptions& options) {
   require_mergeable(maps, options);
   Map result(maps[0]->voxel_size_m, maps[0]->truncation_m);
   result.classes = common_classes(maps);
+  result.properties = common_properties(maps);
   result.metadata = joined_texts(maps);
   const std::vector<const Map*> ordered = canonical_order(maps);
   std::map<BlockCoord, std::vector<const Block*>> blocks;
   for (const Map* map : ordered) {
     result.frames = joined(result.frames, map->frames);
+    result.touches = joined(result.touches, map->touches);
     for (const Block& block : map->store.blocks())
       if (block.geometry->observed()) blocks[block.coord].push_back(&block);
   }
@@ -143,6 +155,7 @@ Map merge(std::span<const Map* const> maps, const MergeOptions& options) {
       merge_color(from, result.store.add_color(to));
     merge_evidence(from, result.store, to);
   }
+  rebuild_touch_planes(result);
   return result;
 }
 

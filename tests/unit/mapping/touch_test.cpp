@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "inference/mixture.h"
+#include "mapping/merge.h"
 #include "mapping/touch_mixture.h"
 #include "mapping/touch_update.h"
 #include "mapping/touch_view.h"
@@ -297,4 +298,18 @@ TEST_CASE("joining two journals gives every touch once, whichever comes first") 
   CHECK(both.touches[0].request.stamp_s == 1);
   CHECK(both.touches[2].request.stamp_s == 3);
   CHECK(journal_digest(both) == journal_digest(joined(right, left)));
+}
+
+TEST_CASE("a merged map holds the touches of both maps") {
+  Map left = two_floors(snow, wood, 4), right = two_floors(snow, wood, 4);
+  touch(left, reading(-0.2, 0, 0.15, 1));
+  touch(right, reading(-0.2, 0, 0.17, 2));
+  const Map* maps[] = {&left, &right};
+  const Map merged = merge(maps);
+  const Belief belief = Beliefs(merged).at({-10, 0, 0});
+  CHECK(belief.readings[0] == 2);
+  CHECK(most_probable_class(belief.class_probability) == ice);
+  const Block& block = *merged.store.get(block_of_voxel({-10, 0, 0}));
+  REQUIRE(block.touch.size() == 1);
+  CHECK(block.touch[0].n->value[offset_in_block({-10, 0, 0})] == 2);
 }
