@@ -40,8 +40,8 @@ struct MixtureCounts {
 
 /// One reading psi (noise of sd `noise_sd` >= 0, units of the property) applied in place to every selected voxel under
 /// the `mixture` model: responsibilities, NIG projection and Dirichlet projection (inference/mixture.h, mixture_update,
-/// is the f64 specification). Noise takes the tempered closed form; a voxel with a class whose variance is below
-/// 3 noise_sd^2 is computed in f64, by quadrature, which is some thousand times slower.
+/// is the f64 specification). Noise takes the tempered closed form; a voxel with a class for which that errs
+/// (inference/noise.h, needs_quadrature) is computed in f64, by quadrature, at a great multiple of the cost.
 ///
 /// Voxels of equal state are computed once. Results do not depend on the order of voxels, on which other voxels are in
 /// the batch, or on the number of threads.

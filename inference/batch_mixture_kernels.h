@@ -28,7 +28,7 @@ inline constexpr float kMostLocation = 1e18f;                     // |tau - tau_
 enum : uint8_t {
   kRefused = 0,
   kUpdated = 1,
-  kTooNoisy = 2,  ///< noise variance above v/3 in some class: the closed form is not good enough (inference/noise.h)
+  kTooNoisy = 2,  ///< some class may need quadrature (inference/noise.h, needs_quadrature)
 };
 
 /// Voxels [begin, end) of `batch`, both multiples of kBatchLanes. Does not look at `selected`; `updated` must be given.

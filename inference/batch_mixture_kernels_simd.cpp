@@ -102,6 +102,14 @@ private:
     return pair::Div(p.gamma, pair::MulAdd(p.beta, noise_variance_, p.gamma));
   }
 
+  /// needs_quadrature of inference/noise.h, a little early: the f64 path decides again what it takes.
+  HWY_INLINE M needs_quadrature(const NigVectors& p, V d) const {
+    const V v = pair::Div(p.gamma, p.beta);
+    const V predictive = pair::Add(pair::Add(v, pair::Div(v, p.kappa)), noise_variance_);
+    const V tail = pair::Add(constant(1.0f), pair::Div(pair::Mul(d, d), predictive));
+    return pair::Lt(v, pair::Mul(pair::Mul(constant(3.001f), noise_variance_), pair::Mul(tail, tail)));
+  }
+
   HWY_INLINE void read_as_each_class(size_t voxel) {
     const V one = constant(1.0f), half = constant(0.5f);
     total_ = taking_part_ = pair::Zero();
@@ -118,10 +126,10 @@ private:
       const NigVectors p = load_nig(voxel, c);
       usable_ = pair::And(usable_, is_usable(p));
       const V s = tempering(p);
-      too_noisy_ = pair::Or(too_noisy_, pair::Lt(s, constant(0.75f)));  // noise variance above v/3
       const V inv_kappa = pair::Div(one, pair::Add(p.kappa, s));
       const V kept = pair::Mul(p.kappa, pair::Mul(s, inv_kappa));
       const V d = deviation(c, p.tau);
+      if (reading_.noise_sd != 0) too_noisy_ = pair::Or(too_noisy_, needs_quadrature(p, d));
       const V inv_gamma = pair::Div(one, p.gamma);
       const V excess =
           pair::Min(pair::Mul(pair::Mul(pair::Mul(half, kept), pair::Mul(d, inv_gamma)), d), constant(1e30f));

@@ -36,13 +36,15 @@ double evidence(const Map& map, const Index3& voxel, uint16_t slot) {
 template <typename Visit>
 void visit_band(const Map& map, const Frame& frame, const IntegrationConfig& config, Visit visit) {
   const DepthView view = depth_view(frame, config, map, nullptr);
-  for (const Block& block : map.store.blocks()) {
+  AllocationScratch scratch;
+  for (const BlockCoord& coord : blocks_in_view(frame.depth_m, frame.camera, frame.T_world_camera, map.voxel_size_m,
+                                                map.truncation_m, config.min_depth_m, config.max_depth_m, scratch)) {
     BlockObservation seen;
-    if (!observe_block_scalar(block.coord, view, seen)) continue;
+    if (!observe_block_scalar(coord, view, seen)) continue;
     for (int i = 0; i < kBlockVoxels; ++i) {
       if ((seen.valid[i >> 3] >> (i & 7) & 1) == 0) continue;
       if (!(std::abs(seen.sdf_m[i]) < float(config.labels.band_vox * map.voxel_size_m))) continue;
-      const Index3 first = first_voxel(block.coord), in = voxel_of_offset(i);
+      const Index3 first = first_voxel(coord), in = voxel_of_offset(i);
       visit(Index3{first.x + in.x, first.y + in.y, first.z + in.z}, seen.pixel[i]);
     }
   }

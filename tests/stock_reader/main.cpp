@@ -12,7 +12,8 @@ int main(int argc, char** argv) {
     openvdb::initialize();
     openvdb::io::File file(argv[1]);
     file.open();
-    for (const openvdb::GridBase::Ptr& grid : *file.getGrids()) {
+    const openvdb::GridPtrVecPtr grids = file.getGrids();
+    for (const openvdb::GridBase::Ptr& grid : *grids) {
       std::printf("%s %s %s %llu %g", grid->getName().c_str(), grid->valueType().c_str(),
                   openvdb::GridBase::gridClassToString(grid->getGridClass()).c_str(),
                   static_cast<unsigned long long>(grid->activeVoxelCount()), grid->voxelSize().x());
