@@ -9,6 +9,9 @@ namespace felt {
 namespace fs = std::filesystem;
 namespace {
 
+/// Frame numbers that may be absent: a stray file name must not make us list a million empty frames.
+constexpr int64_t kMostGaps = 10000;
+
 bool recognises(const fs::path& path) {
   return fs::exists(path / "traj.txt") && has_numbered_file(path / "results", "depth", {".png"});
 }
@@ -23,7 +26,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   const std::vector<StampedPose> poses = read_trajectory(path / "traj.txt", false);
   // Line n of traj.txt belongs to frame n, so a frame without images shows as a missing one.
   const int64_t count = std::max(int64_t(poses.size()), depth.empty() ? 0 : depth.rbegin()->first + 1);
-  if (count > int64_t(poses.size() + depth.size()) + 1000000)
+  if (count > int64_t(poses.size() + depth.size()) + kMostGaps)
     throw FormatError(
         describe_mismatch(path.string(), "frame numbers", "numbers near those of traj.txt", std::to_string(count - 1)));
   for (int64_t number = 0; number < count; ++number) {

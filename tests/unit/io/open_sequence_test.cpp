@@ -395,6 +395,24 @@ TEST_CASE("a generic sequence reports every problem of its description at once")
   CHECK_THROWS_AS(open_sequence(folder.path()), ConfigError);
 }
 
+TEST_CASE("a stray frame number far from the others is refused instead of listing the gap") {
+  TemporaryDirectory folder;
+  write_replica(folder.path(), 2);
+  fs::copy_file(folder.path() / "results" / "depth000000.png", folder.path() / "results" / "depth900000000000.png");
+  CHECK_THROWS_WITH(open_sequence(folder.path()), Catch::Contains("900000000000"));
+}
+
+TEST_CASE("the stored scenes open with their labels and classes") {
+  for (const auto& entry : fs::directory_iterator(fs::path(FELTMAP_SOURCE_DIR) / "data" / "scenes")) {
+    if (!fs::exists(entry.path() / "sequence.yaml")) continue;
+    INFO(entry.path());
+    const auto reader = open_sequence(entry.path());
+    CHECK(reader->info().layout == "generic");
+    CHECK(!reader->info().classes.empty());
+    CHECK(!frame_of(*reader, 0).labels.empty());
+  }
+}
+
 TEST_CASE("a hundred thousand poses open within seconds") {
   TemporaryDirectory folder;
   write_generic(folder.path(), 2);
