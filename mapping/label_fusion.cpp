@@ -85,7 +85,7 @@ LabelStats fuse_labels(const BlockObservation& observation, const LabelView& vie
         last_plane = slot == ClassTable::kNoSlot ? nullptr : &plane_of(slot, block, store);
       }
       if (last_plane == nullptr) {
-        stats.unknown += !view.classes->known(id);
+        stats.unknown += id != kNoLabel && !view.classes->known(id);
         continue;
       }
       if (view.config.max_evidence > 0) forget(block, offset, view.config.evidence, view.config.max_evidence);

@@ -62,7 +62,8 @@ void fuse_tsdf(const BlockObservation& observation, float max_weight, GeometryPl
 void fuse_tsdf_scalar(const BlockObservation& observation, float max_weight, GeometryPlanes& planes) noexcept;
 
 /// Running average of colour over at most kMaxColorCount observations, rounded to 1/256 grey level. Voxels outside
-/// |sdf| < band are left alone. `rgba` holds one 32-bit pixel (r in the low byte) per depth pixel.
+/// |sdf| < band are left alone. `rgba` holds one 32-bit pixel (r in the low byte) per depth pixel;
+/// a = 0 in the high byte: no colour was seen there.
 inline constexpr int kMaxColorCount = 255;
 void fuse_color(const BlockObservation& observation, const uint32_t* rgba, float band_m, ColorPlanes& planes) noexcept;
 void fuse_color_scalar(const BlockObservation& observation, const uint32_t* rgba, float band_m,

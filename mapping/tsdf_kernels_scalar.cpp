@@ -80,6 +80,7 @@ void fuse_color_scalar(const BlockObservation& observation, const uint32_t* rgba
     if ((observation.valid[i >> 3] >> (i & 7) & 1) == 0) continue;
     if (!(std::fabs(observation.sdf_m[i]) < band_m)) continue;
     const uint32_t pixel = rgba[observation.pixel[i]];
+    if (pixel >> 24 == 0) continue;
     const int count = std::min<int>(planes.count[i] + 1, kMaxColorCount);
     const float share = 1.0f / float(count);
     const auto average = [&](uint16_t& stored, uint32_t byte) {

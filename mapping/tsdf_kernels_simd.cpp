@@ -201,10 +201,12 @@ void fuse_color(const BlockObservation& observation, const uint32_t* rgba, float
   }
   for (int n = 0; n < count_todo; ++n) {
     const int i = todo[n];
-    const FloatMask take =
-        hn::And(load_bits(observation.valid, i), hn::Lt(hn::Abs(hn::Load(kF, observation.sdf_m + i)), band));
-    if (hn::AllFalse(kF, take)) continue;
     const auto pixel = hn::Load(kI, pixels + i);
+    // Alpha is the high byte; the shift keeps its sign, which does not matter for the comparison with 0.
+    const FloatMask colored = hn::RebindMask(kF, hn::Ne(hn::ShiftRight<24>(pixel), hn::Zero(kI)));
+    const FloatMask near = hn::Lt(hn::Abs(hn::Load(kF, observation.sdf_m + i)), band);
+    const FloatMask take = hn::And(load_bits(observation.valid, i), hn::And(near, colored));
+    if (hn::AllFalse(kF, take)) continue;
     const FloatVec old_count = hn::ConvertTo(kF, hn::PromoteTo(kI, hn::Load(kU16, planes.count + i)));
     const FloatVec count = hn::Min(hn::Add(old_count, one), top);
     const FloatVec share = hn::Div(one, count);

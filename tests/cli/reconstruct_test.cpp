@@ -134,7 +134,7 @@ TEST_CASE("a program that knows only OpenVDB reads the grids of a map") {
   double voxel_m = 0, least = 0, greatest = 0;
   tsdf >> type >> grid_class >> active >> voxel_m >> least >> greatest;
   CHECK(type == "float");
-  CHECK(grid_class == "level set");
+  CHECK(grid_class == "level_set");
   CHECK(active == report.at("active_voxels").get<size_t>());
   CHECK(voxel_m == Approx(0.02));
   CHECK(least >= -0.0801);

@@ -99,7 +99,7 @@ TEST_CASE("what cannot be touched is refused with one line and leaves the file a
     CHECK(bytes_of(map) == before);
   };
   refused("--at 0,0,0.5 --property friction --value 0.3", 4, "outside the map");
-  refused("--at 0.2,0,0.09 --property friction --value 0.3", 4, "free space");
+  refused("--at 0.2,0,0.085 --property friction --value 0.3", 4, "free space");
   refused("--at 0.2,0,0 --property stiffness --value 0.3", 4, "stiffness");
   refused("--at 0.2,0,0 --property friction --value=-0.3", 4, "[0, inf]");
   refused("--at 0.2,0,0 --property friction --value nan", 4, "value");
@@ -125,8 +125,8 @@ TEST_CASE("a touch is suggested where it teaches most") {
   const json before = ask("suggest " + map + " --property friction")["suggestions"];
   REQUIRE(before.size() == 2);
   CHECK(before[0]["score"].get<double>() >= before[1]["score"].get<double>());
-  // Snow and ice differ: a second touch of what was felt already teaches less than the first.
-  ask("touch " + map + " --at=-0.2,0,0 --property friction --value 0.19");
+  // A reading that fits what was seen settles it: a second touch there teaches less than the first.
+  ask("touch " + map + " --at=-0.2,0,0 --property friction --value 0.39");
   const json after = ask("suggest " + map + " --property friction")["suggestions"];
   const auto score_at_snow = [](const json& suggestions) {
     for (const json& s : suggestions)

@@ -4,7 +4,9 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Count.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <string>
 
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
@@ -14,8 +16,9 @@ int main(int argc, char** argv) {
     file.open();
     const openvdb::GridPtrVecPtr grids = file.getGrids();
     for (const openvdb::GridBase::Ptr& grid : *grids) {
-      std::printf("%s %s %s %llu %g", grid->getName().c_str(), grid->valueType().c_str(),
-                  openvdb::GridBase::gridClassToString(grid->getGridClass()).c_str(),
+      std::string grid_class = openvdb::GridBase::gridClassToString(grid->getGridClass());
+      std::replace(grid_class.begin(), grid_class.end(), ' ', '_');
+      std::printf("%s %s %s %llu %g", grid->getName().c_str(), grid->valueType().c_str(), grid_class.c_str(),
                   static_cast<unsigned long long>(grid->activeVoxelCount()), grid->voxelSize().x());
       if (const auto values = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) {
         const auto range = openvdb::tools::minMax(values->tree());
