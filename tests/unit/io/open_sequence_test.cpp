@@ -403,7 +403,7 @@ TEST_CASE("a stray frame number far from the others is refused instead of listin
 }
 
 TEST_CASE("the stored scenes open with their labels and classes") {
-  for (const auto& entry : fs::directory_iterator(fs::path(FELTMAP_SOURCE_DIR) / "data" / "scenes")) {
+  for (const auto& entry : fs::directory_iterator(felt::test::source_dir() / "data" / "scenes")) {
     if (!fs::exists(entry.path() / "sequence.yaml")) continue;
     INFO(entry.path());
     const auto reader = open_sequence(entry.path());
