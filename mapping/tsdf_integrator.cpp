@@ -58,6 +58,13 @@ size_t allocate_blocks(Map& map, const std::vector<BlockCoord>& coords, bool wit
   return map.store.size() - before;
 }
 
+/// Planes of the next block travel while this one is projected.
+void prefetch(const GeometryPlanes& planes) {
+  const auto* bytes = reinterpret_cast<const char*>(&planes);
+  constexpr size_t kLine = 64;
+  for (size_t at = 0; at < sizeof planes; at += kLine) __builtin_prefetch(bytes + at, 1, 2);
+}
+
 }  // namespace
 
 DepthView depth_view(const Frame& frame, const IntegrationConfig& config, const Map& map, const float* scale) {
@@ -116,6 +123,7 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
     LabelStats label_stats;
     for (size_t n = range.begin(); n < range.end(); ++n) {
       Block& block = map.store[scratch.blocks[n]];
+      if (n + 1 < range.end()) prefetch(*map.store[scratch.blocks[n + 1]].geometry);
       if (!observe_block(coords[n], view, observation)) continue;
       ++observed;
       fuse_tsdf(observation, view.max_weight, *block.geometry);

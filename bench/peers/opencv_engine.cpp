@@ -9,12 +9,11 @@ namespace {
 class HashTsdf final : public Engine {
 public:
   explicit HashTsdf(const Settings& s) {
-    cv::kinfu::VolumeParams params = *cv::kinfu::VolumeParams::defaultParams(cv::kinfu::VolumeType::HASHTSDF);
-    params.voxelSize = float(s.voxel_size_m);
-    params.tsdfTruncDist = float(s.truncation_m);
-    params.depthTruncThreshold = float(s.max_depth_m);
-    params.pose = cv::Affine3f();
-    volume_ = cv::kinfu::makeVolume(params);
+    // The overload that the library exports; step, cap and unit size are its defaults.
+    const auto params = cv::kinfu::VolumeParams::defaultParams(cv::kinfu::VolumeType::HASHTSDF);
+    volume_ = cv::kinfu::makeVolume(cv::kinfu::VolumeType::HASHTSDF, float(s.voxel_size_m), cv::Matx44f::eye(),
+                                    params->raycastStepFactor, float(s.truncation_m), params->maxWeight,
+                                    float(s.max_depth_m), cv::Vec3i::all(params->unitResolution));
   }
   std::string name() const override { return "OpenCV HASHTSDF"; }
   void prepare(const Frame& frame) override {
