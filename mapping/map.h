@@ -20,7 +20,7 @@ struct Map {
   double voxel_size_m;
   double truncation_m;
   BlockStore store;
-  ClassTable classes;  ///< empty: a map without semantics
+  ClassTable classes;        ///< empty: a map without semantics
   PropertyTable properties;  ///< what touches can measure
   FrameJournal frames;
   TouchJournal touches;
