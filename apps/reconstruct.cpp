@@ -77,18 +77,24 @@ bool memory_runs_out(const Map& map) {
   return double(available_memory_bytes()) < estimated_bytes(double(map.store.size()), resolution) - held + 64e6;
 }
 
-FusionRecord fuse(const SequenceReader& sequence, Map& map, const ReconstructOptions& options,
-                  const CommonOptions& common, const InterruptGuard& interrupt) {
+FusionRecord fuse(const SequenceReader& sequence, const PerceptionTimes& perception, Map& map,
+                  const ReconstructOptions& options, const CommonOptions& common, const InterruptGuard& interrupt) {
   ProgressBar progress("frames", sequence.size(), !common.quiet);
   DecodeAhead frames(sequence, {.threads = common.thread_count()});
   FusionRecord record = fuse_sequence(frames, map, options.fusion, [&](const FusionRecord& so_far) -> std::string {
-    progress.update(so_far.read);
+    progress.update(so_far.read,
+                    shares_text({{"network", perception.network_s()},
+                                 {"vote", perception.vote_s()},
+                                 {"decode", frames.decode_s() - perception.network_s() - perception.vote_s()},
+                                 {"fuse", so_far.allocate_s + so_far.fuse_s}}));
     if (interrupt.requested()) return "interrupted";
     constexpr int64_t kMemoryCheckEvery = 32;
     if (so_far.read % kMemoryCheckEvery == 0 && memory_runs_out(map)) return "out of memory";
     return {};
   });
-  record.decode_s = frames.decode_s();
+  record.network_s = perception.network_s();
+  record.vote_s = perception.vote_s();
+  record.decode_s = frames.decode_s() - record.network_s - record.vote_s;
   record.wait_s = frames.wait_s();
   return record;
 }
@@ -132,6 +138,13 @@ void print_summary(const ReconstructReport& report, const fs::path& folder) {
   std::printf("%lld of %lld frames fused in %.2f s: %zu blocks, %zu voxels; mesh of %zu triangles\n",
               static_cast<long long>(fusion.fused), static_cast<long long>(fusion.read), report.total_s, report.blocks,
               report.active_voxels, report.mesh_triangles);
+  if (fusion.network_s + fusion.vote_s > 0)
+    std::printf("  thread time: %s\n", shares_text({{"network", fusion.network_s},
+                                                    {"vote", fusion.vote_s},
+                                                    {"decode", fusion.decode_s},
+                                                    {"fuse", fusion.allocate_s + fusion.fuse_s},
+                                                    {"mesh and save", report.mesh_s + report.save_s}})
+                                           .c_str());
   for (const auto& [reason, count] : fusion.skipped)
     std::printf("  skipped %lld: %s\n", static_cast<long long>(count), reason.c_str());
   for (const char* name : {kMapName, kMeshName, kReportName}) std::printf("  %s\n", (folder / name).c_str());
@@ -142,15 +155,17 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   const ReconstructOptions options = resolve(arguments, common.threads);
   common.threads = options.threads;
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(common.thread_count()));
-  const auto sequence = open_sequence(options.sequence, options.reading);
+  auto sequence = open_sequence(options.sequence, options.reading);
   prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite);
   check_memory(*sequence, options);
+  const Perception perception = perception_of(options.perception, sequence->info().classes);
+  sequence = perceived_sequence(std::move(sequence), perception);
 
   ReconstructReport report;
   Map map(options.voxel_size_m, options.truncation_m);
   map.classes = sequence->info().classes;
   const InterruptGuard interrupt;
-  report.fusion = fuse(*sequence, map, options, common, interrupt);
+  report.fusion = fuse(*sequence, *perception.times, map, options, common, interrupt);
   if (report.fusion.fused == 0 && report.fusion.stopped.empty())
     throw FormatError(describe_mismatch(options.sequence.string(), "frames", "at least one that can be fused",
                                         nothing_fused(report.fusion)));
@@ -190,7 +205,8 @@ void add_reconstruct(CLI::App& app) {
   CLI::App& command = add_command(app,
                                   {"reconstruct", "Fuse a recorded RGB-D sequence into a map, a mesh and a report",
                                    "feltmap reconstruct recording --out result --voxel-size 0.02\n"
-                                   "feltmap reconstruct rgbd_dataset_freiburg1_rpy --out result --frames 0:200:2"},
+                                   "feltmap reconstruct rgbd_dataset_freiburg1_rpy --out result --frames 0:200:2\n"
+                                   "feltmap reconstruct recording --out result --segmenter net.yaml"},
                                   *common, [arguments, common] { return run(*arguments, *common); });
   add_reconstruct_options(command, *arguments);
 }

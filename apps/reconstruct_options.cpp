@@ -100,6 +100,7 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
   command.add_option("--probs", a.probs, "Folder of class probability images")->group(reading);
   command.add_option("--classes", a.classes, "Class table (classes.yaml)")->group(reading);
   command.add_flag("--no-color", a.no_color, "Do not read colour images")->group(reading);
+  a.perception.add_to(command, "Perception", "--segmenter");
 }
 
 ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
@@ -134,6 +135,11 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
     problems.expect(positive(*reading.depth_scale), "--depth-scale", "depth units per metre", "a number above 0",
                     text_of(*reading.depth_scale));
   problems.expect(positive(reading.max_dt_s), "--max-dt", "seconds", "a number above 0", text_of(reading.max_dt_s));
+
+  options.perception = a.perception;
+  reading.instances_dir = a.perception.instances;
+  if (!a.perception.net.empty())
+    problems.expect(reading.read_color, "--segmenter", "colour", "colour images to look at", "--no-color");
 
   options.voxel_size_m = a.voxel_size_m.value_or(file.voxel_size_m.value_or(options.voxel_size_m));
   problems.expect(positive(options.voxel_size_m), "--voxel-size", "edge of a voxel in metres", "a number above 0",
@@ -187,6 +193,7 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   if (!reading.classes_file.empty()) json["classes"] = reading.classes_file.string();
   json["max_dt_s"] = reading.max_dt_s;
   json["color"] = reading.read_color;
+  if (options.perception.asked()) json["perception"] = to_json(options.perception);
   json["voxel_size_m"] = options.voxel_size_m;
   json["truncation_m"] = options.truncation_m;
   json["min_depth_m"] = short_decimal(fusion.min_depth_m);

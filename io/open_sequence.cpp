@@ -57,6 +57,7 @@ void apply_options(const SequenceOptions& options, SequenceListing& listing) {
   if (!options.classes_file.empty()) listing.classes = read_class_table(options.classes_file);
   if (!options.labels_dir.empty()) attach_labels(options.labels_dir, listing);
   if (!options.probs_dir.empty()) attach_probabilities(options.probs_dir, listing);
+  if (!options.instances_dir.empty()) attach_instances(options.instances_dir, listing);
 }
 
 }  // namespace

@@ -15,4 +15,8 @@ void attach_labels(const std::filesystem::path& folder, SequenceListing& listing
 /// planes of class ids, the most probable first, over m planes of their probabilities times 65535.
 void attach_probabilities(const std::filesystem::path& folder, SequenceListing& listing);
 
+/// The same for instance images: one 16-bit PNG a frame with a number a thing, 0 for none; or one folder a frame, named
+/// like an image, of PNG masks with one thing each, as SAM and FastSAM save them.
+void attach_instances(const std::filesystem::path& folder, SequenceListing& listing);
+
 }  // namespace felt
