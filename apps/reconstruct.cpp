@@ -14,6 +14,7 @@
 #include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/reconstruct_options.h"
+#include "apps/recorded_touches.h"
 #include "core/error.h"
 #include "core/simd.h"
 #include "io/atomic_file.h"
@@ -24,6 +25,7 @@
 #include "io/system_memory.h"
 #include "mapping/marching_cubes.h"
 #include "mapping/size_estimate.h"
+#include "mapping/touch_update.h"
 
 namespace felt::apps {
 namespace {
@@ -143,18 +145,27 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   common.threads = options.threads;
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(common.thread_count()));
   const auto sequence = open_sequence(options.sequence, options.reading);
+  const TouchPlan touches = plan_touches(options, *sequence);
   prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite);
   check_memory(*sequence, options);
 
   ReconstructReport report;
   Map map(options.voxel_size_m, options.truncation_m);
   map.classes = sequence->info().classes;
+  map.properties = touches.properties;
   const InterruptGuard interrupt;
   report.fusion = fuse(*sequence, map, options, common, interrupt);
   if (report.fusion.fused == 0 && report.fusion.stopped.empty())
     throw FormatError(describe_mismatch(options.sequence.string(), "frames", "at least one that can be fused",
                                         nothing_fused(report.fusion)));
 
+  // An interrupted run may go on: its touches come with its last frame.
+  std::vector<TouchOutcome> touched;
+  if (report.fusion.stopped.empty()) {
+    const auto start_touch = Clock::now();
+    touched = apply_touches(map, touches);
+    report.touch_s = seconds_since(start_touch);
+  }
   const nlohmann::ordered_json config = to_json(options);
   map.metadata["config"] = config.dump();
   write_results(map, options.out, common.thread_count(), report);
@@ -162,19 +173,24 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   report.blocks = map.store.size();
   report.active_voxels = active_voxel_count(map);
   report.tsdf_bytes = map.store.geometry_bytes(), report.color_bytes = map.store.color_bytes();
-  report.class_bytes = map.store.plane_bytes();
+  report.property_bytes = touch_plane_bytes(map) + journal_bytes(map.touches);
+  report.class_bytes = map.store.plane_bytes() - touch_plane_bytes(map);
   report.threads = common.thread_count();
   report.simd = simd_name();
   report.peak_rss_bytes = peak_resident_bytes();
   report.total_s = seconds_since(start);
-  const std::string json = to_json(report, config).dump(2) + "\n";
+  nlohmann::ordered_json document = to_json(report, config);
+  if (!touches.file.empty()) document["touches"] = touches_json(touches, touched);
+  const std::string json = document.dump(2) + "\n";
   write_file_atomically(options.out / kReportName, json);
 
   if (common.json) {
     std::fputs(json.c_str(), stdout);
   } else if (!common.quiet) {
     print_summary(report, options.out);
+    if (!touched.empty()) std::printf("  %zu touches recorded with the sequence\n", touched.size());
   }
+  print_refused(touches, touched);
   const FusionRecord& fusion = report.fusion;
   if (fusion.stopped.empty()) return kDone;
   std::fprintf(stderr, "feltmap: %s after %lld of %lld frames: what was fused is saved in %s\n", fusion.stopped.c_str(),

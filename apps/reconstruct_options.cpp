@@ -99,6 +99,9 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
   command.add_option("--labels", a.labels, "Folder of label images")->group(reading);
   command.add_option("--probs", a.probs, "Folder of class probability images")->group(reading);
   command.add_option("--classes", a.classes, "Class table (classes.yaml)")->group(reading);
+  command.add_option("--properties", a.properties, "Property table (properties.yaml)")->group(reading);
+  command.add_option("--touches", a.touches, "Recorded touches (touches.csv), each at its stamp or frame")
+      ->group(reading);
   command.add_flag("--no-color", a.no_color, "Do not read colour images")->group(reading);
 }
 
@@ -114,6 +117,8 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   reading.format = a.format.empty() ? file.format.value_or("") : a.format;
   reading.labels_dir = a.labels.empty() ? file.labels : a.labels;
   reading.probs_dir = a.probs.empty() ? file.probs : a.probs;
+  options.properties = a.properties.empty() ? file.properties : a.properties;
+  options.touches = a.touches.empty() ? file.touches : a.touches;
   reading.classes_file = a.classes.empty() ? file.classes : a.classes;
   reading.intrinsics = file.intrinsics;
   reading.pose_convention = file.pose_convention;
@@ -185,6 +190,8 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   if (!reading.labels_dir.empty()) json["labels"] = reading.labels_dir.string();
   if (!reading.probs_dir.empty()) json["probs"] = reading.probs_dir.string();
   if (!reading.classes_file.empty()) json["classes"] = reading.classes_file.string();
+  if (!options.properties.empty()) json["properties"] = options.properties.string();
+  if (!options.touches.empty()) json["touches"] = options.touches.string();
   json["max_dt_s"] = reading.max_dt_s;
   json["color"] = reading.read_color;
   json["voxel_size_m"] = options.voxel_size_m;

@@ -14,6 +14,7 @@ namespace felt::apps {
 struct ReconstructOptions {
   std::filesystem::path sequence, out;
   SequenceOptions reading;
+  std::filesystem::path properties, touches;  ///< empty: what the sequence carries, if anything
   double voxel_size_m = 0.02;
   double truncation_m = 0.08;
   IntegrationConfig fusion;
@@ -23,7 +24,7 @@ struct ReconstructOptions {
 
 /// The command line's own words. What is left empty keeps the default or the configuration file's value.
 struct ReconstructArguments {
-  std::filesystem::path config, sequence, out, labels, probs, classes;
+  std::filesystem::path config, sequence, out, labels, probs, classes, properties, touches;
   std::string format, intrinsics, pose_convention, depth_encoding, frames, truncation;
   std::optional<double> depth_scale, max_dt_s, voxel_size_m, min_depth_m, max_depth_m, max_weight;
   std::optional<DistanceModel> distance;

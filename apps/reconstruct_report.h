@@ -27,7 +27,7 @@ struct ReconstructReport {
   size_t blocks = 0, active_voxels = 0;
   size_t tsdf_bytes = 0, color_bytes = 0, class_bytes = 0, property_bytes = 0;
   size_t peak_rss_bytes = 0;
-  double mesh_s = 0, save_s = 0, total_s = 0;
+  double touch_s = 0, mesh_s = 0, save_s = 0, total_s = 0;
   int threads = 1;
   std::string simd;
   std::string map_hash;

@@ -64,6 +64,9 @@ public:
 
   const SequenceInfo& info() const override { return info_; }
   int64_t size() const override { return int64_t(listing_.frames.size()); }
+  FrameName name(int64_t i) const override {
+    return {listing_.frames[size_t(i)].index, listing_.frames[size_t(i)].stamp_s};
+  }
   ReadResult read(int64_t i) const override;
 
 private:
@@ -91,6 +94,8 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   info_.pose_convention = to_string(listing_.pose_convention);
   info_.classes = listing_.classes;
   info_.notes = listing_.notes;
+  info_.properties_file = listing_.properties_file;
+  info_.touches_file = listing_.touches_file;
   info_.recorded_frames = int64_t(listing_.frames.size());
   find_camera(path);
 

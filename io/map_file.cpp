@@ -67,8 +67,7 @@ std::vector<std::function<openvdb::GridBase::Ptr()>> grids_of(const Map& map) {
   for (const int slot : observed_classes(map)) grids.push_back([&map, slot] { return evidence_grid(map, slot); });
   for (const Touch& touch : map.touches.touches)
     grids.push_back([&map, &touch] { return region_grid(map, touch.region, region_name(touch)); });
-  // Views of the touched voxels are small: they are made once.
-  for (const openvdb::GridBase::Ptr& grid : touch_grids(map)) grids.push_back([grid] { return grid; });
+  for (auto& make : touch_grids(map)) grids.push_back(std::move(make));
   return grids;
 }
 

@@ -48,6 +48,7 @@ struct SequenceListing {
   bool depth_is_ray_length = false;
   PoseConvention pose_convention;
   ClassTable classes;
+  std::filesystem::path properties_file, touches_file;  ///< empty: the sequence carries none
   std::vector<std::string> notes;
 };
 
