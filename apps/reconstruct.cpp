@@ -11,6 +11,7 @@
 #include "apps/exit_code.h"
 #include "apps/fuse_sequence.h"
 #include "apps/interrupt.h"
+#include "apps/label_options.h"
 #include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/reconstruct_options.h"
@@ -80,16 +81,18 @@ bool memory_runs_out(const Map& map) {
 }
 
 FusionRecord fuse(const SequenceReader& sequence, Map& map, const ReconstructOptions& options,
-                  const CommonOptions& common, const InterruptGuard& interrupt) {
+                  const std::vector<uint16_t>& ignored_ids, const CommonOptions& common,
+                  const InterruptGuard& interrupt) {
   ProgressBar progress("frames", sequence.size(), !common.quiet);
   DecodeAhead frames(sequence, {.threads = common.thread_count()});
-  FusionRecord record = fuse_sequence(frames, map, options.fusion, [&](const FusionRecord& so_far) -> std::string {
-    progress.update(so_far.read);
-    if (interrupt.requested()) return "interrupted";
-    constexpr int64_t kMemoryCheckEvery = 32;
-    if (so_far.read % kMemoryCheckEvery == 0 && memory_runs_out(map)) return "out of memory";
-    return {};
-  });
+  FusionRecord record =
+      fuse_sequence(frames, map, options.fusion, ignored_ids, [&](const FusionRecord& so_far) -> std::string {
+        progress.update(so_far.read);
+        if (interrupt.requested()) return "interrupted";
+        constexpr int64_t kMemoryCheckEvery = 32;
+        if (so_far.read % kMemoryCheckEvery == 0 && memory_runs_out(map)) return "out of memory";
+        return {};
+      });
   record.decode_s = frames.decode_s();
   record.wait_s = frames.wait_s();
   return record;
@@ -136,25 +139,35 @@ void print_summary(const ReconstructReport& report, const fs::path& folder) {
               report.active_voxels, report.mesh_triangles);
   for (const auto& [reason, count] : fusion.skipped)
     std::printf("  skipped %lld: %s\n", static_cast<long long>(count), reason.c_str());
+  if (!fusion.unknown_ids.empty()) {
+    std::string ids;
+    for (const auto& [id, pixels] : fusion.unknown_ids) ids += (ids.empty() ? "" : ", ") + std::to_string(id);
+    std::printf("  labels that the class table does not know, not fused: %s\n", ids.c_str());
+  }
+  if (fusion.labels.invalid > 0)
+    std::printf("  %llu observations of probabilities that are no distribution, not fused\n",
+                static_cast<unsigned long long>(fusion.labels.invalid));
   for (const char* name : {kMapName, kMeshName, kReportName}) std::printf("  %s\n", (folder / name).c_str());
 }
 
 int run(const ReconstructArguments& arguments, CommonOptions common) {
   const auto start = Clock::now();
-  const ReconstructOptions options = resolve(arguments, common.threads);
+  ReconstructOptions options = resolve(arguments, common.threads);
   common.threads = options.threads;
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(common.thread_count()));
   const auto sequence = open_sequence(options.sequence, options.reading);
-  const TouchPlan touches = plan_touches(options, *sequence);
+  const PreparedClasses classes = prepare_classes(options.labels, sequence->info().classes);
+  const TouchPlan touches = plan_touches(options, *sequence, classes.table);
   prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite);
   check_memory(*sequence, options);
 
   ReconstructReport report;
   Map map(options.voxel_size_m, options.truncation_m);
-  map.classes = sequence->info().classes;
+  map.classes = classes.table;
   map.properties = touches.properties;
+  options.fusion.labels.likelihood = classes.likelihood.get();
   const InterruptGuard interrupt;
-  report.fusion = fuse(*sequence, map, options, common, interrupt);
+  report.fusion = fuse(*sequence, map, options, classes.ignored_ids, common, interrupt);
   if (report.fusion.fused == 0 && report.fusion.stopped.empty())
     throw FormatError(describe_mismatch(options.sequence.string(), "frames", "at least one that can be fused",
                                         nothing_fused(report.fusion)));
@@ -174,7 +187,9 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   report.active_voxels = active_voxel_count(map);
   report.tsdf_bytes = map.store.geometry_bytes(), report.color_bytes = map.store.color_bytes();
   report.property_bytes = touch_plane_bytes(map) + journal_bytes(map.touches);
-  report.class_bytes = map.store.plane_bytes() - touch_plane_bytes(map);
+  report.classes = map.classes.size();
+  report.class_bytes = class_bytes(map);
+  report.instance_bytes = map.store.instance_bytes();
   report.threads = common.thread_count();
   report.simd = simd_name();
   report.peak_rss_bytes = peak_resident_bytes();

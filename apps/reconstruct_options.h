@@ -5,6 +5,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "io/label_settings.h"
 #include "io/sequence_options.h"
 #include "mapping/integration_config.h"
 
@@ -18,6 +19,7 @@ struct ReconstructOptions {
   double voxel_size_m = 0.02;
   double truncation_m = 0.08;
   IntegrationConfig fusion;
+  LabelSettings labels;
   bool overwrite = false;
   int threads = 0;  ///< 0: all hardware threads
 };
@@ -29,6 +31,7 @@ struct ReconstructArguments {
   std::optional<double> depth_scale, max_dt_s, voxel_size_m, min_depth_m, max_depth_m, max_weight;
   std::optional<DistanceModel> distance;
   std::optional<WeightModel> weight;
+  LabelSettings label_settings;
   bool ray_length = false, no_color = false, carve = false, overwrite = false;
 };
 

@@ -38,7 +38,7 @@ bool any_prior(const PropertyTable& properties, const ClassTable& classes) {
 
 }  // namespace
 
-TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& selected) {
+TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& selected, const ClassTable& classes) {
   const SequenceInfo& info = selected.info();
   TouchPlan plan;
   if (const auto& file = options.properties.empty() ? info.properties_file : options.properties; !file.empty())
@@ -51,7 +51,7 @@ TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& 
   plan.recorded = int64_t(plan.touches.size());
   if (plan.properties.empty())
     plan.unused = "a property table (--properties)";
-  else if (!any_prior(plan.properties, info.classes))
+  else if (!any_prior(plan.properties, classes))
     plan.unused = "a class of the sequence with a prior in the property table";
   if (!plan.unused.empty()) {
     plan.unused = describe_mismatch(plan.file.string(), "touches", plan.unused, "none");
@@ -70,7 +70,7 @@ TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& 
   for (const RecordedTouch& touch : plan.touches) {
     try {
       const double stamp_s = stamp_of(touch, sequence);
-      check_reading(plan.properties, info.classes, reading_of(touch));
+      check_reading(plan.properties, classes, reading_of(touch));
       if (stamp_s >= first_s && stamp_s <= last_s)
         within.push_back(touch);
       else

@@ -25,7 +25,7 @@ struct TouchPlan {
 /// FormatError, with every problem and its line, for touches that cannot belong to the sequence (a stamp outside it) or
 /// that no map of it can hold (an unknown property, a value outside its support). What the sequence merely carries is
 /// left unused where there is no property table or no class with a prior.
-TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& selected);
+TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& selected, const ClassTable& classes);
 
 /// Applies them to the finished map. A touch whose place cannot be touched leaves the map as it was.
 std::vector<TouchOutcome> apply_touches(Map& map, const TouchPlan& plan);

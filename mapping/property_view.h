@@ -1,6 +1,6 @@
 #pragma once
 
-#include <array>
+#include <Eigen/Core>
 #include <memory>
 #include <vector>
 
@@ -30,14 +30,16 @@ public:
   void copy(const Block& block, float* mean, float* sd) const;
 
 private:
+  PropertyEstimate estimate(const Eigen::Array3d& sums) const;
+
   const Map& map_;
   int property_;
   TouchViews touched_;
-  double origin_ = 0;           ///< mean of the classes' means, so that no variance is a difference of large numbers
-  std::vector<double> weight_;  ///< by slot: 1 where the class has a prior
-  std::vector<double> first_;   ///< by slot: mean less origin
-  std::vector<double> second_;  ///< by slot: variance plus the square of that
-  double sum_weight_ = 0, sum_first_ = 0, sum_second_ = 0;
+  double origin_ = 0;  ///< mean of the classes' means, so that no variance is a difference of large numbers
+  /// What one unit of concentration adds, by slot: 1, the mean less origin, the variance plus the square of that; zero
+  /// for a class without a prior.
+  std::vector<Eigen::Array3d> moments_;
+  Eigen::Array3d prior_ = Eigen::Array3d::Zero(), even_ = Eigen::Array3d::Zero();  ///< of no evidence; of one even unit
 };
 
 }  // namespace felt

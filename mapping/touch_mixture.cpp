@@ -26,12 +26,19 @@ std::vector<int> touched_properties(const Map& map) {
 void start(const Map& map, MixtureBlock& block, const std::vector<int>& properties,
            const std::vector<std::vector<Nig>>& priors) {
   const size_t k = size_t(map.classes.size()), m = block.voxels;
-  block.a.assign(k * m, 1.0f);
-  if (const Block* counted = map.store.get(block.coord))
+  block.a.resize(k * m);
+  for (size_t c = 0; c < k; ++c) std::fill_n(&block.a[c * m], m, float(map.classes.prior(int(c))));
+  if (const Block* counted = map.store.get(block.coord)) {
+    if (const Plane* even = counted->even_evidence)
+      for (size_t c = 0; c < k; ++c) {
+        float* a = &block.a[c * m];
+        for_each_bit(block.mask, [&](int offset) { *a++ += even->value[offset] / float(k); });
+      }
     for (const EvidencePlane& e : counted->evidence) {
       float* a = &block.a[e.slot * m];
       for_each_bit(block.mask, [&](int offset) { *a++ += e.counts->value[offset]; });
     }
+  }
   for (const int p : properties) {
     MixtureBlock::Blocks& state = block.properties.emplace_back();
     state.property = p;

@@ -135,7 +135,7 @@ ClassBelief class_belief_at(const Map& map, const std::vector<TouchView>& touche
   if (const TouchView* view = view_of(touched, coord); view != nullptr && view->mask.test(i))
     return {uint16_t(view->label[size_t(i)]), view->label_probability[size_t(i)], view->entropy[size_t(i)]};
   const Block* block = map.store.get(coord);
-  return block == nullptr ? ClassBelief{} : class_belief(*block, i, map.classes.size());
+  return block == nullptr ? ClassBelief{} : class_belief(*block, i, map.classes);
 }
 
 TouchBlocks::TouchBlocks(const Map& map) {

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "mapping/leaf_mask.h"
-#include "mapping/property_view.h"
 #include "mapping/touch_view.h"
 
 namespace felt {
@@ -60,12 +59,12 @@ Region touched_region(const Map& map, int property) {
 }
 
 /// `<property>_mean` or `<property>_sd`, active where it exists.
-openvdb::FloatGrid::Ptr property_grid(const Map& map, const PropertyView& view, int property, bool sd) {
+openvdb::FloatGrid::Ptr property_grid(const Map& map, const PropertyView& view, const std::string& name, bool sd) {
   Region known;
   for (const uint32_t number : map.store.sorted())
-    if (const Block& block = map.store[number]; !block.evidence.empty() || !block.touch.empty())
+    if (const Block& block = map.store[number]; block.has_evidence() || !block.touch.empty())
       known.append(block.coord, all_voxels());
-  return float_grid(map, known, map.properties[property].name + (sd ? "_sd" : "_mean"), [&](size_t b, float* out) {
+  return float_grid(map, known, name, [&](size_t b, float* out) {
     float other[kBlockVoxels];
     const Block& block = *map.store.get(known.coord[b]);
     sd ? view.copy(block, other, out) : view.copy(block, out, other);
@@ -101,30 +100,34 @@ Region region_of(const openvdb::MaskGrid& grid) {
   return region;
 }
 
-std::vector<std::function<openvdb::GridBase::Ptr()>> touch_grids(const Map& map) {
-  std::vector<std::function<openvdb::GridBase::Ptr()>> grids;
+std::vector<NamedGrid> touch_grids(const Map& map, TouchViews touched) {
+  std::vector<NamedGrid> grids;
   const bool labelled = std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
-                                    [](const Block& block) { return !block.evidence.empty(); });
+                                    [](const Block& block) { return block.has_evidence(); });
   if (map.properties.empty() || !labelled) return grids;
-  const auto views = std::make_shared<const std::vector<TouchView>>(touch_views(map));
-  grids.push_back([&map, views] {
-    Region touched;
-    for (const TouchView& view : *views) touched.append(view.coord, view.mask);
-    return region_grid(map, touched, "touched");
+  const auto add = [&](const std::string& name, auto make) {
+    grids.push_back({name, [name, make] { return make(name); }});
+  };
+  add("touched", [&map, touched](const std::string& name) {
+    Region region;
+    for (const TouchView& view : *touched) region.append(view.coord, view.mask);
+    return region_grid(map, region, name);
   });
   for (int p = 0; p < map.properties.size(); ++p)
     for (const bool sd : {false, true})
-      grids.push_back([&map, views, p, sd] { return property_grid(map, PropertyView(map, p, views), p, sd); });
-  if (!map.touches.any_active()) return grids;
+      add(map.properties[p].name + (sd ? "_sd" : "_mean"), [&map, touched, p, sd](const std::string& name) {
+        return property_grid(map, PropertyView(map, p, touched), name, sd);
+      });
+  if (touched->empty()) return grids;
   const auto blocks = std::make_shared<const TouchBlocks>(map);
   for (int p = 0; p < map.properties.size(); ++p) {
     const auto readings = std::make_shared<const Region>(touched_region(map, p));
     if (readings->empty()) continue;
-    const std::string name = map.properties[p].name;
+    const std::string property = map.properties[p].name;
     for (const auto& [part, plane] :
          {std::pair("n", &TouchPlanes::n), {"mean", &TouchPlanes::mean}, {"m2", &TouchPlanes::m2}})
-      grids.push_back([&map, readings, p, plane = plane, full_name = "touch/" + name + "/" + part] {
-        return float_grid(map, *readings, full_name, [&](size_t b, float* out) {
+      add("touch/" + property + "/" + part, [&map, readings, p, plane = plane](const std::string& name) {
+        return float_grid(map, *readings, name, [&](size_t b, float* out) {
           for (const TouchPlanes& planes : map.store.get(readings->coord[b])->touch)
             if (planes.property == p) std::copy_n((planes.*plane)->value, kBlockVoxels, out);
         });
@@ -134,11 +137,11 @@ std::vector<std::function<openvdb::GridBase::Ptr()>> touch_grids(const Map& map)
       if (!has_prior(priors[size_t(slot)])) continue;
       for (const auto& [part, number] :
            {std::pair("tau", &Nig::tau), {"kappa", &Nig::kappa}, {"beta", &Nig::beta}, {"gamma", &Nig::gamma}})
-        grids.push_back([&map, readings, blocks, p, slot, number = number,
-                         full_name = "property/" + name + "/" + map.classes.at_slot(slot).name + "/" + part] {
-          return float_grid(map, *readings, full_name,
-                            [&](size_t b, float* out) { blocks->copy(readings->coord[b], p, slot, number, out); });
-        });
+        add("property/" + property + "/" + map.classes.at_slot(slot).name + "/" + part,
+            [&map, readings, blocks, p, slot, number = number](const std::string& name) {
+              return float_grid(map, *readings, name,
+                                [&](size_t b, float* out) { blocks->copy(readings->coord[b], p, slot, number, out); });
+            });
     }
   }
   return grids;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mapping/map.h"
+#include "mapping/property_view.h"
 
 namespace felt {
 
@@ -22,6 +23,11 @@ Region region_of(const openvdb::MaskGrid& grid);
 /// * `property/<property>/<class>/{tau,kappa,beta,gamma}`: the moment-matched Normal-Inverse-Gamma blocks, for every
 ///   class with a prior.
 /// One call for each grid, so that no more than one has to be in memory; the map must outlive them and stay as it is.
-std::vector<std::function<openvdb::GridBase::Ptr()>> touch_grids(const Map& map);
+/// `touched`: touch_views(map).
+struct NamedGrid {
+  std::string name;
+  std::function<openvdb::GridBase::Ptr()> make;
+};
+std::vector<NamedGrid> touch_grids(const Map& map, TouchViews touched);
 
 }  // namespace felt
