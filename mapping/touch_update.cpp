@@ -21,19 +21,29 @@ std::string number(double x) {
   return text;
 }
 
-/// Statistics of one property over the touches of one block, voxel by voxel in canonical order (Welford).
+/// Statistics of one property over the touches of one block, voxel by voxel in canonical order (Welford). `planes` hold
+/// zeros.
 void accumulate(const Map& map, uint16_t property, const BlockCoord& coord, const TouchPlanes& planes) {
-  for (Plane* plane : {planes.n, planes.mean, planes.m2}) std::memset(plane, 0, sizeof(Plane));
+  bool first = true;
   for (const Touch& touch : map.touches.touches) {
     if (touch.undone || touch.request.property != map.properties[property].name) continue;
     const BlockMask* mask = touch.region.find(coord);
     if (mask == nullptr) continue;
+    const double psi = touch.request.value;
+    if (first) {
+      for_each_bit(*mask, [&](int i) {
+        planes.n->value[i] = 1;
+        planes.mean->value[i] = float(psi);
+      });
+      first = false;
+      continue;
+    }
     for_each_bit(*mask, [&](int i) {
       float &n = planes.n->value[i], &mean = planes.mean->value[i], &m2 = planes.m2->value[i];
-      const double step = touch.request.value - double(mean);
+      const double step = n > 0 ? psi - double(mean) : psi;
       n += 1;
-      mean = float(double(mean) + step / double(n));
-      m2 = float(double(m2) + step * (touch.request.value - double(mean)));
+      mean = float(n > 1 ? double(mean) + step / double(n) : psi);
+      if (n > 1) m2 = float(double(m2) + step * (psi - double(mean)));
     });
   }
 }
@@ -50,6 +60,8 @@ void update_block(Map& map, Block& block) {
                                [](const TouchPlanes& planes, size_t property) { return planes.property < property; });
     if (at == block.touch.end() || at->property != p)
       at = block.touch.insert(at, {uint16_t(p), map.store.new_plane(), map.store.new_plane(), map.store.new_plane()});
+    else
+      for (Plane* plane : {at->n, at->mean, at->m2}) std::memset(plane, 0, sizeof(Plane));
     accumulate(map, uint16_t(p), block.coord, *at);
   }
 }
