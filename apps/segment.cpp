@@ -101,9 +101,9 @@ SegmentRecord segment_frames(const SequenceReader& sequence, const Perception& p
   while (std::optional<ReadResult> next = frames.next()) {
     ++record.read;
     if (const auto* skipped = std::get_if<SkippedFrame>(&*next)) {
-      ++record.skipped[skipped->reason];
-    } else if (const Frame& frame = std::get<Frame>(*next); perception.skip(frame.index)) {
-      ++record.present;
+      skipped->reason == kAlreadyThere ? ++record.present : ++record.skipped[skipped->reason];
+    } else if (const Frame& frame = std::get<Frame>(*next); frame.labels.empty() && frame.probabilities.empty()) {
+      ++record.skipped["no labels"];
     } else {
       const auto start = Clock::now();
       write_bytes_atomically(names.of(frame.index), names.probabilities

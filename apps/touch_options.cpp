@@ -77,8 +77,8 @@ Eigen::Vector3d point_of(const std::string& text) {
 }
 
 void RegionOptions::add_to(CLI::App& command) {
-  command.add_option("--region", rule, "connected, mask or sphere")
-      ->check(CLI::IsMember({"connected", "mask", "sphere"}))
+  command.add_option("--region", rule, "connected, mask, sphere, or instance: the thing touched")
+      ->check(CLI::IsMember({"connected", "mask", "sphere", "instance"}))
       ->capture_default_str();
   command.add_option("--radius", settings.radius_m, "Limit in metres: along the surface, or of the sphere");
   command.add_option("--snap", settings.snap_voxels, "How far the surface may be from the point, voxels")
@@ -95,7 +95,9 @@ void RegionOptions::add_to(CLI::App& command) {
   command.add_option("--color-change", settings.color_change,
                      "Largest difference from the contact's colour, grey levels");
   command.add_option("--mask", mask, "Image whose non-zero pixels belong to the region (with --region mask)");
-  command.add_option("--intrinsics", intrinsics, "Camera of the mask: fx,fy,cx,cy")->delimiter(',')->expected(4);
+  command.add_option("--intrinsics", intrinsics, "Camera of the mask: fx,fy,cx,cy or fx,fy,cx,cy,width,height")
+      ->delimiter(',')
+      ->expected(4, 6);
   command.add_option("--pose", pose, "Camera to world of the mask: 16 numbers row by row")
       ->delimiter(',')
       ->expected(16);
@@ -110,7 +112,7 @@ RegionSettings RegionOptions::resolved() const {
 
 std::optional<ViewMask> RegionOptions::view() const {
   if (rule != "mask") return std::nullopt;
-  if (mask.empty() || intrinsics.size() != 4 || pose.size() != 16)
+  if (mask.empty() || (intrinsics.size() != 4 && intrinsics.size() != 6) || pose.size() != 16)
     throw TouchError("region mask: expected --mask, --intrinsics and --pose, found not all of them");
   return read_view_mask(mask, intrinsics, pose);
 }

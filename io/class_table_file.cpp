@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <sstream>
 
 #include "core/error.h"
@@ -89,10 +90,18 @@ void read_yaml_class(const YAML::Node& row, const fs::path& path, Table& table) 
       table.problems.push_back(
           describe_mismatch(where, "ignore", "true or false", "'" + scalar_text(row["ignore"]) + "'"));
   }
+  if (row["prior"]) {
+    const auto prior = parse_number(scalar_text(row["prior"]));
+    if (prior && *prior > 0 && std::isfinite(*prior))
+      info.prior = *prior;
+    else
+      table.problems.push_back(
+          describe_mismatch(where, "prior", "a number above 0", "'" + scalar_text(row["prior"]) + "'"));
+  }
   for (const auto& entry : row) {
     const std::string key = scalar_text(entry.first);
-    if (key != "id" && key != "name" && key != "color" && key != "ignore")
-      table.problems.push_back(describe_mismatch(where, "key", "id, name, color or ignore", "'" + key + "'"));
+    if (key != "id" && key != "name" && key != "color" && key != "ignore" && key != "prior")
+      table.problems.push_back(describe_mismatch(where, "key", "id, name, color, ignore or prior", "'" + key + "'"));
   }
   // A class whose id is unreadable would also be reported as a duplicate of class 0.
   if (id && !info.name.empty()) table.classes.push_back(info);
@@ -157,9 +166,12 @@ ClassTable read_class_table(const fs::path& path) {
 std::string class_table_yaml(const ClassTable& classes) {
   std::ostringstream text;
   text << "classes:\n";
-  for (const ClassInfo& c : classes.classes())
+  for (const ClassInfo& c : classes.classes()) {
     text << "  - {id: " << c.id << ", name: " << quoted_name(c.name) << ", color: [" << int(c.color.r) << ", "
-         << int(c.color.g) << ", " << int(c.color.b) << "]" << (c.ignore ? ", ignore: true" : "") << "}\n";
+         << int(c.color.g) << ", " << int(c.color.b) << "]" << (c.ignore ? ", ignore: true" : "");
+    if (c.prior != 1) text << ", prior: " << c.prior;
+    text << "}\n";
+  }
   return text.str();
 }
 

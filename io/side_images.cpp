@@ -37,8 +37,23 @@ NamedImages images_in(const fs::path& folder, bool folders) {
   return images;
 }
 
-void attach(const fs::path& folder, SequenceListing& listing, ImageSource FrameRecord::*member, const char* what,
-            bool folders = false) {
+/// PNG images of a folder by name, numbers within names in their order.
+std::vector<ImageSource> masks_in(const fs::path& folder) {
+  std::vector<ImageSource> masks;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == ".png") masks.push_back({.path = entry.path()});
+  const auto key = [](const ImageSource& mask) {
+    const std::string stem = mask.path.stem().string();
+    return std::pair(parse_integer(stem).value_or(-1), stem);
+  };
+  std::sort(masks.begin(), masks.end(), [&](const auto& a, const auto& b) { return key(a) < key(b); });
+  return masks;
+}
+
+}  // namespace
+
+void attach_images(const fs::path& folder, SequenceListing& listing, ImageSource FrameRecord::*member,
+                   const char* what, bool folders) {
   const NamedImages images = images_in(folder, folders);
   bool any = false;
   for (FrameRecord& frame : listing.frames) {
@@ -58,31 +73,12 @@ void attach(const fs::path& folder, SequenceListing& listing, ImageSource FrameR
                           std::to_string(images.by_stem.size()) + " PNG images, none of them of a frame"));
 }
 
-/// PNG images of a folder by name, numbers within names in their order.
-std::vector<ImageSource> masks_in(const fs::path& folder) {
-  std::vector<ImageSource> masks;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-    if (entry.path().extension() == ".png") masks.push_back({.path = entry.path()});
-  const auto key = [](const ImageSource& mask) {
-    const std::string stem = mask.path.stem().string();
-    return std::pair(parse_integer(stem).value_or(-1), stem);
-  };
-  std::sort(masks.begin(), masks.end(), [&](const auto& a, const auto& b) { return key(a) < key(b); });
-  return masks;
-}
-
-}  // namespace
-
 void attach_labels(const fs::path& folder, SequenceListing& listing) {
-  attach(folder, listing, &FrameRecord::labels, "labels");
-}
-
-void attach_probabilities(const fs::path& folder, SequenceListing& listing) {
-  attach(folder, listing, &FrameRecord::probabilities, "probabilities");
+  attach_images(folder, listing, &FrameRecord::labels, "labels");
 }
 
 void attach_instances(const fs::path& folder, SequenceListing& listing) {
-  attach(folder, listing, &FrameRecord::instances, "instances", /*folders=*/true);
+  attach_images(folder, listing, &FrameRecord::instances, "instances", /*folders=*/true);
   for (FrameRecord& frame : listing.frames) {
     frame.masks.clear();
     if (frame.instances.empty() || !fs::is_directory(frame.instances.path)) continue;

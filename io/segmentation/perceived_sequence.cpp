@@ -48,10 +48,11 @@ public:
   const SequenceInfo& info() const override { return info_; }
   int64_t size() const override { return sequence_->size(); }
 
+  FrameName name(int64_t i) const override { return sequence_->name(i); }
   ReadResult read(int64_t i) const override {
+    if (perception_.skip && perception_.skip(name(i).index)) return SkippedFrame{name(i).index, kAlreadyThere, ""};
     ReadResult result = sequence_->read(i);
-    auto* const frame = std::get_if<Frame>(&result);
-    if (frame != nullptr && !(perception_.skip && perception_.skip(frame->index))) label(*frame);
+    if (auto* frame = std::get_if<Frame>(&result)) label(*frame);
     return result;
   }
 

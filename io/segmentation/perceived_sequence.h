@@ -22,6 +22,9 @@ struct PerceptionTimes {
 /// Class-agnostic segments of a frame: none, from its depth and normals, or the instance images that it carries.
 enum class SegmentSource { none, geometric, instances };
 
+/// Why a frame was left out on request (`Perception::skip`).
+inline constexpr const char* kAlreadyThere = "already there";
+
 /// What is made of a frame between decoding and fusion.
 struct Perception {
   std::shared_ptr<const Segmenter> segmenter;  ///< null: the labels that the sequence carries
@@ -29,9 +32,14 @@ struct Perception {
   SegmentSource vote = SegmentSource::none;    ///< segments whose pixels are given one class
   FrameSegmentSettings segments;               ///< of `geometric`
   double least_share = 0.5;           ///< of labels: what the winner of a segment must hold (mapping/segment_voting.h)
-  std::function<bool(int64_t)> skip;  ///< by frame number: frames that are decoded only; empty: none
+  /// By frame number: frames that are not read. They come as skipped, with the reason kAlreadyThere.
+  std::function<bool(int64_t)> skip;
   std::shared_ptr<PerceptionTimes> times = std::make_shared<PerceptionTimes>();
 
+  /// Of the perceived frames of a sequence.
+  const ClassTable& classes(const SequenceInfo& info) const {
+    return segmenter != nullptr ? segmenter->classes() : info.classes;
+  }
   bool active() const { return segmenter != nullptr || vote != SegmentSource::none; }
 };
 

@@ -22,7 +22,7 @@ std::string save_floor(const TemporaryDirectory& folder) {
   Map map = labelled_map(
       0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
       class_table({"wood", "snow", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 0; }, 20);
-  map.properties = read_properties(felt::test::source_dir().string() + "/data/friction.yaml");
+  map.properties = read_properties(felt::test::source_dir().string() + "/data/properties.yaml");
   const std::string path = (folder.path() / "map.vdb").string();
   save_map(map, path);
   return path;
