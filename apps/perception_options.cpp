@@ -30,7 +30,8 @@ void PerceptionArguments::add_to(CLI::App& command, const char* group, const cha
       ->group(group);
   command
       .add_option("--segment-color", color_step,
-                  "Geometric segments also end where colour steps by this, grey levels [0: colour does not matter]")
+                  "Geometric segments also end where colour steps by this, grey levels; 0: colour does not matter")
+      ->capture_default_str()
       ->check(CLI::Range(0.0, 450.0))
       ->group(group);
 }
@@ -52,7 +53,7 @@ nlohmann::ordered_json to_json(const PerceptionArguments& arguments) {
   for (const auto& [name, source] : kSources)
     if (source == arguments.vote) json["vote"] = name;
   if (!arguments.instances.empty()) json["masks"] = arguments.instances.string();
-  if (arguments.color_step > 0) json["segment_color"] = arguments.color_step;
+  if (arguments.vote == SegmentSource::geometric) json["segment_color"] = arguments.color_step;
   return json;
 }
 

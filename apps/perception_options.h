@@ -14,7 +14,7 @@ struct PerceptionArguments {
   std::filesystem::path net;  ///< description of the network; empty: none
   int top = 0;
   SegmentSource vote = SegmentSource::none;
-  double color_step = 0;
+  double color_step = FrameSegmentSettings{}.color_step;
   std::filesystem::path instances;
   bool asked() const { return !net.empty() || vote != SegmentSource::none; }
   void add_to(CLI::App& command, const char* group, const char* net_option);

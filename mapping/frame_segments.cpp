@@ -2,17 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 
 namespace felt {
 namespace {
 
-constexpr int kSmoothing = 2;   ///< pixels on either side that depth and normals are averaged over
-constexpr int kDifference = 3;  ///< pixels on either side that slopes of depth and changes of normals are taken over
-
 /// Size of the images and the depth that decides what belongs together.
 struct Grid {
   int w, h;
+  int smoothing;       ///< pixels on either side that depth and normals are averaged over
+  int difference;      ///< pixels on either side that slopes of depth and changes of normals are taken over
   const float* depth;  ///< 0: not measured
   const float* step;   ///< largest difference to a neighbour on the same surface; -1 where nothing was measured
 };
@@ -29,24 +29,24 @@ void prepare(const DepthImage& depth_m, const FrameSegmentSettings& s, FrameSegm
   }
 }
 
-/// Mean of `value` over the pixels up to `kSmoothing` to either side whose depth is within the pixel's step of its own,
+/// Mean of `value` over the pixels up to `smoothing` to either side whose depth is within the pixel's step of its own,
 /// along rows (`stride` 1) or columns (`stride` w).
-void smooth_along(const Grid& grid, const float* value, ptrdiff_t stride, float* out) {
+void smooth_along(const Grid& grid, const float* value, std::ptrdiff_t stride, float* out) {
   const bool rows = stride == 1;
-  const int u0 = rows ? kSmoothing : 0, u1 = rows ? grid.w - kSmoothing : grid.w;
+  const int reach = grid.smoothing, u0 = rows ? reach : 0, u1 = rows ? grid.w - reach : grid.w;
   for (int v = 0; v < grid.h; ++v) {
     const size_t row = size_t(v) * size_t(grid.w);
     const float *const x = value + row, *const d = grid.depth + row, *const limit = grid.step + row;
     float* const mean = out + row;
-    if (rows ? grid.w <= 2 * kSmoothing : v < kSmoothing || v >= grid.h - kSmoothing) {
+    if (rows ? grid.w <= 2 * reach : v < reach || v >= grid.h - reach) {
       std::copy_n(x, grid.w, mean);
       continue;
     }
     std::copy_n(x, u0, mean);
     for (int u = u0; u < u1; ++u) {
       float sum = x[u], count = 1;
-      for (int k = 1; k <= kSmoothing; ++k) {
-        const ptrdiff_t a = u - k * stride, b = u + k * stride;
+      for (int k = 1; k <= reach; ++k) {
+        const std::ptrdiff_t a = u - k * stride, b = u + k * stride;
         const float wa = std::fabs(d[a] - d[u]) < limit[u] ? 1.0f : 0.0f;
         const float wb = std::fabs(d[b] - d[u]) < limit[u] ? 1.0f : 0.0f;
         sum += wa * x[a] + wb * x[b];
@@ -58,11 +58,13 @@ void smooth_along(const Grid& grid, const float* value, ptrdiff_t stride, float*
   }
 }
 
-/// Slope of depth per pixel along one axis, from whichever sides lie on the same surface; 0 beside the image's edge.
-float slope(const float* depth, ptrdiff_t far, float reach) {
-  const float back = depth[0] - depth[-far], ahead = depth[far] - depth[0];
-  const float wb = std::fabs(back) < reach ? 1.0f : 0.0f, wa = std::fabs(ahead) < reach ? 1.0f : 0.0f;
-  return (wb * back + wa * ahead) / (float(kDifference) * std::max(1.0f, wa + wb));
+/// Slope of depth per pixel between pixels `far` elements and `pixels` pixels away, from whichever sides lie within the
+/// image and on the same surface.
+float slope(const float* depth, std::ptrdiff_t far, int pixels, bool has_back, bool has_ahead, float reach) {
+  const float back = has_back ? depth[0] - depth[-far] : 0.0f, ahead = has_ahead ? depth[far] - depth[0] : 0.0f;
+  const float wb = has_back && std::fabs(back) < reach ? 1.0f : 0.0f;
+  const float wa = has_ahead && std::fabs(ahead) < reach ? 1.0f : 0.0f;
+  return (wb * back + wa * ahead) / (float(pixels) * std::max(1.0f, wa + wb));
 }
 
 void normalise(float& x, float& y, float& z) {
@@ -73,32 +75,31 @@ void normalise(float& x, float& y, float& z) {
 /// Unit normals of the smoothed depth, themselves smoothed, pointing away from the camera.
 void find_normals(const Grid& grid, const PinholeCamera& camera, FrameSegmentScratch& scratch) {
   const float fx = float(camera.fx), fy = float(camera.fy), cx = float(camera.cx), cy = float(camera.cy);
-  const int w = grid.w;
+  const int w = grid.w, k = grid.difference;
   for (auto& plane : scratch.normal) plane.resize(scratch.depth.size());
-  const auto slopes = [&](int v, bool inner, int u0, int u1) {
+  const auto row_of_normals = [&](int v, bool up, bool down, bool left, bool right, int u0, int u1) {
     const size_t row = size_t(v) * size_t(w);
     const float *const d = scratch.smooth.data() + row, *const limit = grid.step + row;
     float *const x = scratch.normal[0].data() + row, *const y = scratch.normal[1].data() + row,
                  *const z = scratch.normal[2].data() + row;
     for (int u = u0; u < u1; ++u) {
-      const float su = inner ? slope(d + u, kDifference, 2 * limit[u]) : 0.0f;
-      const float sv = inner ? slope(d + u, ptrdiff_t(kDifference) * w, 2 * limit[u]) : 0.0f;
+      const float su = slope(d + u, k, k, left, right, 2 * limit[u]);
+      const float sv = slope(d + u, std::ptrdiff_t(k) * w, k, up, down, 2 * limit[u]);
       // Cross product of the two tangents of z(u, v) ray(u, v), divided by z / (fx fy).
       x[u] = -fx * su, y[u] = -fy * sv;
       z[u] = d[u] + (float(u) - cx) * su + (float(v) - cy) * sv;
       normalise(x[u], y[u], z[u]);
     }
   };
-  const int margin = std::min(kDifference, w);
   for (int v = 0; v < grid.h; ++v) {
-    const bool inner = v >= kDifference && v < grid.h - kDifference && w > 2 * kDifference;
-    if (inner) {
-      slopes(v, false, 0, margin);
-      slopes(v, true, margin, w - margin);
-      slopes(v, false, w - margin, w);
-    } else {
-      slopes(v, false, 0, w);
-    }
+    const bool up = v >= k, down = v + k < grid.h;
+    const int left = std::min(k, w), right = std::max(left, w - k);
+    for (int u = 0; u < left; ++u) row_of_normals(v, up, down, false, u + k < w, u, u + 1);
+    if (up && down)
+      row_of_normals(v, true, true, true, true, left, right);
+    else
+      row_of_normals(v, up, down, true, true, left, right);
+    for (int u = right; u < w; ++u) row_of_normals(v, up, down, u >= k, false, u, u + 1);
   }
   for (auto& plane : scratch.normal) {
     smooth_along(grid, plane.data(), 1, scratch.spare.data());
@@ -122,22 +123,22 @@ public:
         cx_(float(camera.cx)),
         cy_(float(camera.cy)) {}
 
-  void along_row(int v, uint8_t* joined) const { join(v, 1, 0, grid_.w - 1, kDifference, joined); }
+  void along_row(int v, uint8_t* joined) const { join(v, 1, 0, grid_.w - 1, grid_.difference, joined); }
   /// `v` has a row below it.
   void down(int v, uint8_t* joined) const {
-    join(v, grid_.w, 0, grid_.w, std::min({kDifference, v, grid_.h - 2 - v}), joined);
+    join(v, grid_.w, 0, grid_.w, std::min({grid_.difference, v, grid_.h - 2 - v}), joined);
   }
 
 private:
   /// `reach`: how far before and behind the pair the normals are compared.
-  void join(int v, ptrdiff_t next, int u0, int u1, int reach, uint8_t* joined) const {
+  void join(int v, std::ptrdiff_t next, int u0, int u1, int reach, uint8_t* joined) const {
     const bool rows = next == 1;
     const size_t row = size_t(v) * size_t(grid_.w);
     const float *const d = smooth_ + row, *const limit = grid_.step + row;
     const float *const nx = normal_[0] + row, *const ny = normal_[1] + row, *const nz = normal_[2] + row;
     const float y0 = (float(v) - cy_) * fy_, y1 = rows ? y0 : y0 + fy_;
     for (int u = u0; u < u1; ++u) {
-      const ptrdiff_t o = u + next;
+      const std::ptrdiff_t o = u + next;
       const float x0 = (float(u) - cx_) * fx_, x1 = rows ? x0 + fx_ : x0;
       const float px = d[o] * x1 - d[u] * x0, py = d[o] * y1 - d[u] * y0, pz = d[o] - d[u];
       const float off = std::fabs(nx[u] * px + ny[u] * py + nz[u] * pz);
@@ -155,14 +156,14 @@ private:
   }
   /// Normals beyond the pair, as long as they lie on its surface: smoothing spreads a crease over several pixels, so
   /// that neighbours alone always agree.
-  void compare_normals(int v, ptrdiff_t next, int u0, int u1, int reach, uint8_t* joined) const {
+  void compare_normals(int v, std::ptrdiff_t next, int u0, int u1, int reach, uint8_t* joined) const {
     const size_t row = size_t(v) * size_t(grid_.w);
     const float *const d = smooth_ + row, *const limit = grid_.step + row;
     const float *const nx = normal_[0] + row, *const ny = normal_[1] + row, *const nz = normal_[2] + row;
     for (int u = u0; u < u1; ++u) {
-      const ptrdiff_t o = u + next, far = reach * next;
-      const ptrdiff_t a = std::fabs(d[u - far] - d[u]) < 2 * limit[u] ? u - far : u;
-      const ptrdiff_t b = std::fabs(d[o + far] - d[u]) < 2 * limit[u] ? o + far : o;
+      const std::ptrdiff_t o = u + next, far = reach * next;
+      const std::ptrdiff_t a = std::fabs(d[u - far] - d[u]) < 2 * limit[u] ? u - far : u;
+      const std::ptrdiff_t b = std::fabs(d[o + far] - d[u]) < 2 * limit[u] ? o + far : o;
       joined[u] &= uint8_t(nx[a] * nx[b] + ny[a] * ny[b] + nz[a] * nz[b] > least_cos_);
     }
   }
@@ -177,7 +178,7 @@ private:
 void part_by_color(const ColorImage& color, int v, bool rows, double largest, uint8_t* joined) {
   const int w = color.width();
   if (!rows && (v < 2 || v >= color.height() - 3)) return;
-  const ptrdiff_t next = rows ? 1 : w;
+  const std::ptrdiff_t next = rows ? 1 : w;
   const int limit = int(9 * largest * largest);
   for (int u = rows ? 2 : 0; u < (rows ? w - 3 : w); ++u) {
     const Rgba8* const c = color.row(v) + u;
@@ -269,7 +270,9 @@ Image<uint16_t> frame_segments(const DepthImage& depth_m, const PinholeCamera& c
   const int w = depth_m.width(), h = depth_m.height();
   if (depth_m.empty()) return {};
   prepare(depth_m, settings, scratch);
-  const Grid grid{w, h, scratch.depth.data(), scratch.step.data()};
+  // Chosen on 640 pixels across: a pixel of a smaller image covers more of the surface.
+  const auto pixels = [&](double at_640) { return std::max(1, int(std::lround(at_640 * w / 640))); };
+  const Grid grid{w, h, pixels(2), pixels(3), scratch.depth.data(), scratch.step.data()};
   scratch.smooth.resize(depth_m.size());
   scratch.spare.resize(depth_m.size());
   smooth_along(grid, grid.depth, 1, scratch.spare.data());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -10,13 +11,14 @@ namespace felt {
 
 /// When two neighbouring pixels of a depth image lie on one smooth surface.
 struct FrameSegmentSettings {
-  double normal_change_deg = 10;    ///< largest angle between the normals three pixels on either side of their border
+  double normal_change_deg =
+      10;  ///< largest angle between their normals, taken three pixels further out (of 640 across)
   double plane_distance_m = 0.004;  ///< largest distance of a point to the other's tangent plane
   double depth_step_m = 0.02;       ///< largest difference of depth
   double noise_free_m = 1.5;        ///< beyond this depth both distances grow with the square of depth
   /// Largest difference of colour (Euclidean, grey levels) between the means of three pixels on either side; 0: colour
   /// does not matter.
-  double color_step = 0;
+  double color_step = 25;
   int min_pixels = 200;  ///< smaller pieces go to the segment around them
 };
 

@@ -283,6 +283,14 @@ std::vector<Region> regions_of(const Surface& surface, const std::vector<Place>&
 
 }  // namespace
 
+MapSegmentSettings map_segment_settings(const RegionSettings& settings) {
+  MapSegmentSettings out;
+  out.band_voxels = settings.band_voxels;
+  out.min_weight = settings.min_weight;
+  out.color_change = std::isfinite(settings.color_change) ? settings.color_change : 0;
+  return out;
+}
+
 std::vector<Region> map_segments(const Map& map, const MapSegmentSettings& settings) {
   const Surface surface(map, settings);
   const Agreement agree(settings);

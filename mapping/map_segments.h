@@ -5,6 +5,7 @@
 
 #include "mapping/map.h"
 #include "mapping/region.h"
+#include "mapping/region_settings.h"
 
 namespace felt {
 
@@ -18,6 +19,9 @@ struct MapSegmentSettings {
   bool classes = true;                 ///< voxels whose strongest classes differ are parted
   size_t min_voxels = 100;             ///< smaller pieces go to the segment around them
 };
+
+/// Those of the region rule `segment`: band, least weight and, where limited, colour of the rule's settings.
+MapSegmentSettings map_segment_settings(const RegionSettings& settings);
 
 /// Cuts the surface of a map into segments: 26-neighbours are joined (union-find) where normals, tangent planes, colour
 /// and class agree, then pieces below `min_voxels` (voxels of creases among them) are given to the segments that they

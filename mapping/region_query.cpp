@@ -11,6 +11,7 @@
 #include <numbers>
 #include <queue>
 
+#include "mapping/map_segments.h"
 #include "mapping/region_surface.h"
 
 namespace felt {
@@ -270,6 +271,13 @@ uint16_t contact_instance(const Map& map, const Index3& centre, const SurfaceRul
                                      any ? "one without an instance id" : "none (reconstruct --instances)"));
 }
 
+/// The contact's segment of the map, cut to `within`.
+Region segment_around(const Map& map, const Contact& contact, const RegionSettings& settings, const Region& within) {
+  for (const Region& segment : map_segments(map, map_segment_settings(settings)))
+    if (segment.contains(contact.voxel)) return intersected(segment, within);
+  throw TouchError("region segment: contact: expected a surface that is part of a segment, found a piece too small");
+}
+
 /// Says what is at a point that is too far from every surface.
 [[noreturn]] void fail_to_snap(const Map& map, const Eigen::Vector3d& p, const std::string& where, double radius_m) {
   const std::string expected = "observed surface within " + metres(radius_m);
@@ -347,8 +355,10 @@ Region find_region(const Map& map, const Contact& contact, const RegionSettings&
     rule.instance = contact_instance(map, contact.voxel, rule);
     return surface_blocks(map, rule);
   }
+  if (settings.rule == RegionRule::segment) return segment_around(map, contact, settings, surface_blocks(map, rule));
   if (settings.rule != RegionRule::connected)
-    throw TouchError(describe_mismatch("region", "rule", "connected, sphere or instance", rule_name(settings.rule)));
+    throw TouchError(
+        describe_mismatch("region", "rule", "connected, sphere, instance or segment", rule_name(settings.rule)));
   rule.slot = contact.slot;
   rule.class_ratio = float(settings.class_ratio);
   rule.cos_normal_change = float(std::cos(settings.normal_change_deg * std::numbers::pi / 180));

@@ -15,14 +15,17 @@ const char* rule_name(RegionRule rule) {
       return "sphere";
     case RegionRule::instance:
       return "instance";
+    case RegionRule::segment:
+      return "segment";
   }
   return "";
 }
 
 RegionRule rule_of_name(const std::string& name) {
-  for (const RegionRule rule : {RegionRule::connected, RegionRule::mask, RegionRule::sphere, RegionRule::instance})
+  for (const RegionRule rule : {RegionRule::connected, RegionRule::mask, RegionRule::sphere, RegionRule::instance,
+                                RegionRule::segment})
     if (name == rule_name(rule)) return rule;
-  throw TouchError(describe_mismatch("region", "rule", "connected, mask, sphere or instance", "'" + name + "'"));
+  throw TouchError(describe_mismatch("region", "rule", "connected, mask, sphere, instance or segment", "'" + name + "'"));
 }
 
 void validate(const RegionSettings& s) {

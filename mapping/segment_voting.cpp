@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cstddef>
 #include <vector>
 
 namespace felt {
@@ -70,7 +71,7 @@ void pool_probabilities(const Image<uint16_t>& segments, double own_weight, Prob
   const auto keep_greatest = [&](size_t p) {
     const size_t kept = std::min(top, k);
     for (size_t i = 0; i < k; ++i) order[i] = uint16_t(i);
-    std::partial_sort(order.begin(), order.begin() + ptrdiff_t(kept), order.end(),
+    std::partial_sort(order.begin(), order.begin() + std::ptrdiff_t(kept), order.end(),
                       [&](uint16_t a, uint16_t b) { return mixed[a] != mixed[b] ? mixed[a] > mixed[b] : a < b; });
     for (size_t i = 0; i < top; ++i) {
       probabilities.class_id[p * top + i] = i < kept ? id.value(order[i]) : uint16_t(0);

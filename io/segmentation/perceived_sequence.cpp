@@ -87,14 +87,6 @@ private:
 
 }  // namespace
 
-Image<uint16_t> segments_of(const Frame& frame, SegmentSource source, const FrameSegmentSettings& settings) {
-  if (source == SegmentSource::geometric) return frame_segments(frame.depth_m, frame.camera, frame.color, settings);
-  Image<uint16_t> instances = source == SegmentSource::instances ? frame.instances : Image<uint16_t>();
-  for (uint16_t& i : instances)
-    if (i == kNoLabel) i = 0;  // outside the labelled image
-  return instances;
-}
-
 std::unique_ptr<SequenceReader> perceived_sequence(std::unique_ptr<SequenceReader> sequence,
                                                    const Perception& perception) {
   if (!perception.active()) return sequence;

@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "io/reader.h"
+#include "io/segmentation/segment_source.h"
 #include "io/segmentation/segmenter.h"
-#include "mapping/frame_segments.h"
 
 namespace felt {
 
@@ -19,9 +19,6 @@ struct PerceptionTimes {
   double vote_s() const { return 1e-9 * double(vote_ns); }
 };
 
-/// Class-agnostic segments of a frame: none, from its depth and normals, or the instance images that it carries.
-enum class SegmentSource { none, geometric, instances };
-
 /// Why a frame was left out on request (`Perception::skip`).
 inline constexpr const char* kAlreadyThere = "already there";
 
@@ -31,7 +28,7 @@ struct Perception {
   int top = 0;                                 ///< probabilities kept of a pixel; 0: a label
   SegmentSource vote = SegmentSource::none;    ///< segments whose pixels are given one class
   FrameSegmentSettings segments;               ///< of `geometric`
-  double least_share = 0.5;           ///< of labels: what the winner of a segment must hold (mapping/segment_voting.h)
+  double least_share = 0.5;  ///< of labels: what the winner of a segment must hold (mapping/segment_voting.h)
   /// By frame number: frames that are not read. They come as skipped, with the reason kAlreadyThere.
   std::function<bool(int64_t)> skip;
   std::shared_ptr<PerceptionTimes> times = std::make_shared<PerceptionTimes>();
@@ -42,9 +39,6 @@ struct Perception {
   }
   bool active() const { return segmenter != nullptr || vote != SegmentSource::none; }
 };
-
-/// Segments of a frame by their source: numbers from 1, 0 where there is none. Empty where the frame has no instances.
-Image<uint16_t> segments_of(const Frame& frame, SegmentSource source, const FrameSegmentSettings& settings = {});
 
 /// The sequence with its frames perceived: `read` decodes a frame, runs the segmenter on its colour and replaces its
 /// labels or probabilities, and lets the pixels of each segment vote (probabilities, the segmenter's always, are pooled
