@@ -78,7 +78,7 @@ Eigen::Vector3d point_of(const std::string& text) {
 
 void RegionOptions::add_to(CLI::App& command) {
   command.add_option("--region", rule, "connected, mask, sphere, or instance: the thing touched")
-      ->check(CLI::IsMember({"connected", "mask", "sphere", "instance"}))
+      ->check(CLI::IsMember({"connected", "mask", "sphere"}))
       ->capture_default_str();
   command.add_option("--radius", settings.radius_m, "Limit in metres: along the surface, or of the sphere");
   command.add_option("--snap", settings.snap_voxels, "How far the surface may be from the point, voxels")

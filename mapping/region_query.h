@@ -42,7 +42,6 @@ Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const Regio
 ///   the band all have normals within `normal_change_deg` of theirs; their neighbours join and end it. So nothing on
 ///   the far side of a crease can join, whatever the order of growth.
 /// * `sphere`: the surface band within radius_m of the contact.
-/// * `instance`: the surface band of the thing that the contact belongs to, wherever it is in the map.
 /// Deterministic; blocks are examined in parallel.
 Region find_region(const Map& map, const Contact& contact, const RegionSettings& settings);
 

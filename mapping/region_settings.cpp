@@ -6,23 +6,13 @@
 namespace felt {
 
 const char* rule_name(RegionRule rule) {
-  switch (rule) {
-    case RegionRule::connected:
-      return "connected";
-    case RegionRule::mask:
-      return "mask";
-    case RegionRule::sphere:
-      return "sphere";
-    case RegionRule::instance:
-      return "instance";
-  }
-  return "";
+  return rule == RegionRule::connected ? "connected" : rule == RegionRule::mask ? "mask" : "sphere";
 }
 
 RegionRule rule_of_name(const std::string& name) {
-  for (const RegionRule rule : {RegionRule::connected, RegionRule::mask, RegionRule::sphere, RegionRule::instance})
+  for (const RegionRule rule : {RegionRule::connected, RegionRule::mask, RegionRule::sphere})
     if (name == rule_name(rule)) return rule;
-  throw TouchError(describe_mismatch("region", "rule", "connected, mask, sphere or instance", "'" + name + "'"));
+  throw TouchError(describe_mismatch("region", "rule", "connected, mask or sphere", "'" + name + "'"));
 }
 
 void validate(const RegionSettings& s) {
