@@ -126,7 +126,7 @@ private:
 
 constexpr int kMostNewtonSteps = 40;
 
-/// A step of this relative size leaves 4e-6 (ordinary voxels; docs/batch_kernels.md).
+/// A step of this relative size leaves at most 1.3e-5 (a >= 1; docs/batch_kernels.md).
 constexpr float kLastStep = 0.012f;
 
 /// Newton on digamma(out_i) - digamma(sum out) = E[ln w_i] for the lanes `live`. The Hessian's diagonal and its rank
@@ -190,7 +190,8 @@ HWY_INLINE void iterate_dirichlet(const DirichletRows& rows, size_t k, V total, 
     }
     const V s_relative = clamp_to(pair::Mul(sum_linear, s_end.inv_x), -0.5f, 0.5f);
     bend = pair::NegMulAdd(pair::NegMulAdd(half, s_slope, one), pair::Mul(sum_linear, s_relative), bend);
-    const V limit = pair::Mul(half, pair::Abs(common));
+    // Far from the solution the second order may not outvote the first; near it, it is small itself.
+    const V limit = pair::MulAdd(half, pair::Abs(common), constant(1e-3f));
     const V second = pair::Max(pair::Neg(limit), pair::Min(limit, pair::Mul(bend, inv_rank_one)));
 
     V largest = zero;
