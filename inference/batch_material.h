@@ -50,7 +50,8 @@ struct MaterialCounts {
 ///
 /// Error against f64, relative (p absolute, tau to the class's sqrt(gamma/beta)), with L the largest |log evidence|
 /// among the classes that matter: 1e-5 + 2e-6 L for p, tau, kappa, beta, gamma, and that times max(1, L) for the
-/// surprise. Never NaN; kappa and beta stay in [1e-15, 1e15], gamma in [1e-30, 1e30].
+/// surprise; tau besides to 4e-7 of its distance from tau_origin, which is all that f32 keeps. Never NaN; kappa and
+/// beta stay in [1e-15, 1e15], gamma in [1e-30, 1e30].
 MaterialCounts material_view(const MaterialBatch& batch, double rho) noexcept;
 
 /// The same for many batches (the blocks of a region), one task each.
