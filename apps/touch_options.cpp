@@ -177,6 +177,35 @@ std::string belief_text(const Map& map, const Belief& belief) {
   return out.str();
 }
 
+std::string property_text(const json& belief) {
+  std::ostringstream out;
+  out.precision(3);
+  for (const auto& [name, p] : belief.at("properties").items()) {
+    out << "  " << name << ": ";
+    if (!p.contains("location")) {
+      out << p.at("reason").get<std::string>() << "\n";
+      continue;
+    }
+    const auto number = [&](const json& x) -> std::string {
+      if (x.is_null()) return "?";
+      std::ostringstream text;
+      text.precision(3);
+      text << x.get<double>();
+      return text.str();
+    };
+    out << number(p.at("mean")) << " +- " << number(p.at("sd"))
+        << ", 5 to 95 %: " << number(p.at("quantiles").at("0.05")) << " to " << number(p.at("quantiles").at("0.95"))
+        << ", CVaR: " << number(p.at("cvar").at("lower_0.05")) << " and " << number(p.at("cvar").at("upper_0.95"));
+    if (p.contains("below"))
+      out << ", P(<= " << p.at("below").at("threshold").get<double>() << ") "
+          << number(p.at("below").at("probability"));
+    if (p.contains("gait")) out << ", " << p.at("gait").at("decision").get<std::string>() << " gait";
+    if (p.contains("reason")) out << " (" << p.at("reason").get<std::string>() << ")";
+    out << "\n";
+  }
+  return out.str();
+}
+
 void use_properties(Map& map, const std::string& file) {
   if (file.empty()) return;
   const PropertyTable table = read_properties(file);

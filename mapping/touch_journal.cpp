@@ -124,12 +124,6 @@ uint64_t id_of_text(const std::string& text) {
   return std::stoull(text, nullptr, 16);
 }
 
-size_t journal_bytes(const TouchJournal& journal) {
-  size_t bytes = journal.touches.size() * sizeof(Touch);
-  for (const Touch& touch : journal.touches) bytes += touch.region.blocks() * (sizeof(BlockCoord) + sizeof(BlockMask));
-  return bytes;
-}
-
 std::string journal_digest(const TouchJournal& journal) {
   if (!journal.any_active()) return "";
   Digest digest;

@@ -76,9 +76,6 @@ TouchJournal joined(const TouchJournal& a, const TouchJournal& b);
 std::string id_text(uint64_t id);
 uint64_t id_of_text(const std::string& text);
 
-/// Heap bytes of the touches with their region masks.
-size_t journal_bytes(const TouchJournal& journal);
-
 /// Digest of the active touches with their region masks, empty where there is none.
 std::string journal_digest(const TouchJournal& journal);
 

@@ -199,6 +199,12 @@ size_t touch_plane_bytes(const Map& map) {
   return planes * sizeof(Plane);
 }
 
+size_t journal_bytes(const TouchJournal& journal) {
+  size_t bytes = journal.touches.size() * sizeof(Touch);
+  for (const Touch& touch : journal.touches) bytes += touch.region.blocks() * (sizeof(BlockCoord) + sizeof(BlockMask));
+  return bytes;
+}
+
 void refresh_touch_regions(Map& map) {
   for (Touch& touch : map.touches.touches) {
     if (touch.request.region.rule == RegionRule::mask) continue;

@@ -43,8 +43,9 @@ void redo_touch(Map& map, uint64_t id);
 /// Writes the statistics planes of every block anew from the journal, as after loading or merging.
 void rebuild_touch_planes(Map& map);
 
-/// Heap bytes of the statistics planes: only touched blocks have any.
+/// Heap bytes of the statistics planes (only touched blocks have any), and of the journal with its region masks.
 size_t touch_plane_bytes(const Map& map);
+size_t journal_bytes(const TouchJournal& journal);
 
 /// Finds the regions of all active `connected` and `sphere` touches anew, as the map is now: after frames, so that
 /// touches recorded before, between and after frames give the same map. A touch whose contact is gone keeps its region.
