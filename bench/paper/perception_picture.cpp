@@ -14,6 +14,7 @@
 #include "io/segmentation/segmenter.h"
 #include "mapping/render_classes.h"
 #include "mapping/segment_voting.h"
+#include "mapping/voxel_beliefs.h"
 
 namespace {
 using namespace felt;
@@ -55,6 +56,7 @@ int main(int argc, char** argv) {
     return 1;
   }
   const RayCaster caster(map);
+  const VoxelBeliefs beliefs(map);
   const int width = sequence->info().camera.width / kShrink, height = sequence->info().camera.height / kShrink;
   ColorImage canvas(4 * width + 3 * kGap, (argc - 5) * (height + kGap) - kGap, {255, 255, 255, 255});
   for (int row = 0; row < argc - 5; ++row) {
@@ -64,7 +66,7 @@ int main(int argc, char** argv) {
     const LabelImage raw = most_probable_labels(probabilities);
     pool_probabilities(segments_of(frame, SegmentSource::geometric), 0, probabilities);
     const RenderedView view = caster.render(frame.camera, frame.T_world_camera);
-    const LabelImage columns[] = {raw, most_probable_labels(probabilities), class_image(map, view.voxel)};
+    const LabelImage columns[] = {raw, most_probable_labels(probabilities), class_image(map, beliefs, view.voxel)};
     paste(frame.color, 0, row * (height + kGap), canvas);
     for (int i = 0; i < 3; ++i)
       paste(tinted(columns[i], map.classes, frame.color), (i + 1) * (width + kGap), row * (height + kGap), canvas);
