@@ -48,8 +48,7 @@ std::vector<ClassBelief> vertex_beliefs(const Map& map, const std::vector<Vertex
     Index3 voxel = edge.voxel;
     if (edge.t > 0.5f) (edge.axis == 0 ? voxel.x : edge.axis == 1 ? voxel.y : voxel.z) += 1;
     const Block* block = map.store.get(block_of_voxel(voxel));
-    beliefs.push_back(block == nullptr ? ClassBelief{}
-                                       : class_belief(*block, offset_in_block(voxel), map.classes.size()));
+    beliefs.push_back(block == nullptr ? ClassBelief{} : class_belief(*block, offset_in_block(voxel), map.classes));
   }
   return beliefs;
 }

@@ -2,10 +2,12 @@
 
 #include <openvdb/openvdb.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "core/error.h"
@@ -14,6 +16,7 @@
 #include "io/map_trailer.h"
 #include "io/vdb_writer.h"
 #include "mapping/touch_update.h"
+#include "mapping/vdb_classes.h"
 #include "mapping/vdb_state.h"
 #include "mapping/vdb_touch.h"
 #include "mapping/vdb_views.h"
@@ -54,10 +57,28 @@ bool has_color(const Map& map) {
 
 std::string region_name(const Touch& touch) { return "touch_region/" + id_text(touch.id); }
 
+using MakeGrid = std::function<openvdb::GridBase::Ptr()>;
+
+/// Beliefs of maps with classes, and what of class state only few maps have.
+void add_class_grids(const Map& map, const TouchViews& touched, std::vector<MakeGrid>& grids) {
+  const auto any = [&](auto has) { return std::any_of(map.store.blocks().begin(), map.store.blocks().end(), has); };
+  if (any([](const Block& b) { return b.geometry->observed() && b.even_evidence != nullptr; }))
+    grids.push_back([&] { return even_evidence_grid(map); });
+  if (any([](const Block& b) { return b.geometry->observed() && b.instance != nullptr; })) {
+    grids.push_back([&] { return instance_grid(map); });
+    grids.push_back([&] { return instance_votes_grid(map); });
+  }
+  if (map.classes.size() == 0) return;
+  grids.push_back([&map, touched] { return label_grid(map, *touched); });
+  grids.push_back([&map, touched] { return label_probability_grid(map, *touched); });
+  grids.push_back([&map, touched] { return entropy_grid(map, *touched); });
+  grids.push_back([&map] { return total_evidence_grid(map); });
+}
+
 /// One call for each grid of the file: made when it is written and gone afterwards, so that the file's size does not
 /// decide about memory.
-std::vector<std::function<openvdb::GridBase::Ptr()>> grids_of(const Map& map) {
-  std::vector<std::function<openvdb::GridBase::Ptr()>> grids;
+std::vector<MakeGrid> grids_of(const Map& map) {
+  std::vector<MakeGrid> grids;
   grids.push_back([&] { return tsdf_grid(map); });
   grids.push_back([&] { return weight_grid(map); });
   if (has_color(map)) {
@@ -65,10 +86,11 @@ std::vector<std::function<openvdb::GridBase::Ptr()>> grids_of(const Map& map) {
     grids.push_back([&] { return color_count_grid(map); });
   }
   for (const int slot : observed_classes(map)) grids.push_back([&map, slot] { return evidence_grid(map, slot); });
+  const auto touched = std::make_shared<const std::vector<TouchView>>(touch_views(map));
+  add_class_grids(map, touched, grids);
   for (const Touch& touch : map.touches.touches)
     grids.push_back([&map, &touch] { return region_grid(map, touch.region, region_name(touch)); });
-  // Views of the touched voxels are small: they are made once.
-  for (const openvdb::GridBase::Ptr& grid : touch_grids(map)) grids.push_back([grid] { return grid; });
+  for (NamedGrid& grid : touch_grids(map, touched)) grids.push_back(std::move(grid.make));
   return grids;
 }
 
@@ -100,6 +122,11 @@ Map read_map(const fs::path& path) {
   for (int slot = 0; slot < map.classes.size(); ++slot)
     if (const std::string name = "evidence/" + map.classes.at_slot(slot).name; file.hasGrid(name))
       add_evidence(map, slot, *read_grid<openvdb::FloatGrid>(file, name, where));
+  if (file.hasGrid("evidence_even"))
+    add_even_evidence(map, *read_grid<openvdb::FloatGrid>(file, "evidence_even", where));
+  if (file.hasGrid("instance"))
+    add_instances(map, *read_grid<openvdb::Int32Grid>(file, "instance", where),
+                  *read_grid<openvdb::Int32Grid>(file, "instance_votes", where));
   map.properties = header.properties;
   map.touches = header.touches;
   for (Touch& touch : map.touches.touches) {

@@ -27,11 +27,18 @@ void copy_observed(const Block& from, const Mask& inside, BlockStore& store, Blo
       color.count[i] = from.color->count[i];
     }
   }
-  for (const EvidencePlane& evidence : from.evidence) {
-    Plane* counts = store.new_plane();
+  const auto copied = [&](const Plane& plane) {
+    Plane* copy = store.new_plane();
     for (int i = 0; i < kBlockVoxels; ++i)
-      if (inside[i]) counts->value[i] = evidence.counts->value[i];
-    to.evidence.push_back({evidence.slot, counts});
+      if (inside[i]) copy->value[i] = plane.value[i];
+    return copy;
+  };
+  for (const EvidencePlane& evidence : from.evidence) to.evidence.push_back({evidence.slot, copied(*evidence.counts)});
+  if (from.even_evidence != nullptr) to.even_evidence = copied(*from.even_evidence);
+  if (from.instance != nullptr) {
+    InstancePlanes& instance = store.add_instance(to);
+    for (int i = 0; i < kBlockVoxels; ++i)
+      if (inside[i]) instance.id[i] = from.instance->id[i], instance.votes[i] = from.instance->votes[i];
   }
 }
 
