@@ -6,9 +6,8 @@
 
 namespace felt::apps {
 
-FusionRecord fuse_sequence(DecodeAhead& frames, Map& map, const IntegrationConfig& config,
-                           const std::function<std::string(const FusionRecord&)>& after_frame) {
-  FusionRecord record;
+void fuse_sequence(DecodeAhead& frames, const FrameSource& source, const IntegrationConfig& config, Map& map,
+                   FusionRecord& record, const std::function<std::string(const FusionRecord&)>& after_frame) {
   IntegrationScratch scratch;
   while (std::optional<ReadResult> next = frames.next()) {
     ++record.read;
@@ -16,7 +15,9 @@ FusionRecord fuse_sequence(DecodeAhead& frames, Map& map, const IntegrationConfi
       ++record.skipped[skipped->reason];
       spdlog::info("frame {} skipped: {}: {}", skipped->index, skipped->reason, skipped->detail);
     } else {
-      const FrameStats stats = integrate(map, std::get<Frame>(*next), config, scratch);
+      const Frame& frame = std::get<Frame>(*next);
+      const FrameStats stats = integrate(map, frame, config, scratch);
+      record_frame(map.frames, source.recording, source.settings, frame.index);
       ++record.fused;
       record.allocate_s += stats.allocate_s;
       record.fuse_s += stats.fuse_s;
@@ -25,7 +26,6 @@ FusionRecord fuse_sequence(DecodeAhead& frames, Map& map, const IntegrationConfi
     record.stopped = after_frame(record);
     if (!record.stopped.empty()) break;
   }
-  return record;
 }
 
 }  // namespace felt::apps

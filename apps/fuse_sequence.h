@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 
 #include "apps/reconstruct_report.h"
 #include "io/decode_ahead.h"
@@ -9,9 +10,16 @@
 
 namespace felt::apps {
 
-/// Fuses frames in recorded order while later ones are decoded. `after_frame` is called with the record after every
-/// frame, fused or skipped; a text that is not empty ends fusion there, with that reason: what was fused stays.
-FusionRecord fuse_sequence(DecodeAhead& frames, Map& map, const IntegrationConfig& config,
-                           const std::function<std::string(const FusionRecord&)>& after_frame);
+/// Where frames come from, as the frame journal names it.
+struct FrameSource {
+  std::string recording;  ///< SequenceInfo::fingerprint
+  std::string settings;   ///< fusion_settings (apps/checkpoint.h)
+};
+
+/// Fuses frames in recorded order while later ones are decoded, notes each in the map's journal and goes on with
+/// `record`. `after_frame` is called with the record after every frame, fused or skipped; a text that is not empty ends
+/// fusion there, with that reason: what was fused stays.
+void fuse_sequence(DecodeAhead& frames, const FrameSource& source, const IntegrationConfig& config, Map& map,
+                   FusionRecord& record, const std::function<std::string(const FusionRecord&)>& after_frame);
 
 }  // namespace felt::apps

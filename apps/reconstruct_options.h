@@ -18,7 +18,9 @@ struct ReconstructOptions {
   double truncation_m = 0.08;
   IntegrationConfig fusion;
   bool overwrite = false;
-  int threads = 0;  ///< 0: all hardware threads
+  int64_t checkpoint_every = 0;  ///< frames; 0: only at the end
+  bool resume = false;           ///< go on with the map in `out`, where there is one
+  int threads = 0;               ///< 0: all hardware threads
 };
 
 /// The command line's own words. What is left empty keeps the default or the configuration file's value.
@@ -28,7 +30,8 @@ struct ReconstructArguments {
   std::optional<double> depth_scale, max_dt_s, voxel_size_m, min_depth_m, max_depth_m, max_weight;
   std::optional<DistanceModel> distance;
   std::optional<WeightModel> weight;
-  bool ray_length = false, no_color = false, carve = false, overwrite = false;
+  bool ray_length = false, no_color = false, carve = false, overwrite = false, resume = false;
+  int64_t checkpoint_every = 0;
 };
 
 void add_reconstruct_options(CLI::App& command, ReconstructArguments& arguments);

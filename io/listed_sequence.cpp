@@ -9,6 +9,7 @@
 #include "io/camera_file.h"
 #include "io/image_decode.h"
 #include "io/registration.h"
+#include "io/sequence_fingerprint.h"
 #include "io/text_input.h"
 #include "io/trajectory_file.h"
 
@@ -92,6 +93,7 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   info_.classes = listing_.classes;
   info_.notes = listing_.notes;
   info_.recorded_frames = int64_t(listing_.frames.size());
+  info_.fingerprint = fingerprint(listing_);
   find_camera(path);
 
   std::vector<FrameRecord> selected;

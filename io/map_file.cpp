@@ -2,75 +2,20 @@
 
 #include <openvdb/openvdb.h>
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <functional>
 #include <vector>
 
 #include "core/error.h"
-#include "io/atomic_file.h"
+#include "io/map_grids.h"
 #include "io/map_metadata.h"
 #include "io/map_trailer.h"
-#include "io/vdb_writer.h"
+#include "io/vdb_file.h"
 #include "mapping/touch_update.h"
 #include "mapping/vdb_state.h"
 #include "mapping/vdb_touch.h"
-#include "mapping/vdb_views.h"
 
 namespace felt {
 namespace fs = std::filesystem;
 namespace {
-
-uint32_t vdb_flags(MapCompression compression) {
-  switch (compression) {
-    case MapCompression::none:
-      break;
-    case MapCompression::blosc:
-      return openvdb::io::COMPRESS_ACTIVE_MASK | openvdb::io::COMPRESS_BLOSC;
-    case MapCompression::zip:
-      return openvdb::io::COMPRESS_ACTIVE_MASK | openvdb::io::COMPRESS_ZIP;
-  }
-  return openvdb::io::COMPRESS_ACTIVE_MASK;
-}
-
-/// Which classes have a plane anywhere, by slot.
-std::vector<int> observed_classes(const Map& map) {
-  std::vector<bool> seen(size_t(map.classes.size()), false);
-  for (const Block& block : map.store.blocks())
-    if (block.geometry->observed())
-      for (const EvidencePlane& plane : block.evidence) seen[plane.slot] = true;
-  std::vector<int> slots;
-  for (int slot = 0; slot < map.classes.size(); ++slot)
-    if (seen[size_t(slot)]) slots.push_back(slot);
-  return slots;
-}
-
-bool has_color(const Map& map) {
-  for (const Block& block : map.store.blocks())
-    if (block.color != nullptr) return true;
-  return false;
-}
-
-std::string region_name(const Touch& touch) { return "touch_region/" + id_text(touch.id); }
-
-/// One call for each grid of the file: made when it is written and gone afterwards, so that the file's size does not
-/// decide about memory.
-std::vector<std::function<openvdb::GridBase::Ptr()>> grids_of(const Map& map) {
-  std::vector<std::function<openvdb::GridBase::Ptr()>> grids;
-  grids.push_back([&] { return tsdf_grid(map); });
-  grids.push_back([&] { return weight_grid(map); });
-  if (has_color(map)) {
-    grids.push_back([&] { return color_grid(map); });
-    grids.push_back([&] { return color_count_grid(map); });
-  }
-  for (const int slot : observed_classes(map)) grids.push_back([&map, slot] { return evidence_grid(map, slot); });
-  for (const Touch& touch : map.touches.touches)
-    grids.push_back([&map, &touch] { return region_grid(map, touch.region, region_name(touch)); });
-  // Views of the touched voxels are small: they are made once.
-  for (const openvdb::GridBase::Ptr& grid : touch_grids(map)) grids.push_back([grid] { return grid; });
-  return grids;
-}
 
 template <typename Grid>
 typename Grid::Ptr read_grid(openvdb::io::File& file, const std::string& name, const std::string& where) {
@@ -98,7 +43,7 @@ Map read_map(const fs::path& path) {
     add_color(map, *read_grid<openvdb::Vec3SGrid>(file, "color", where),
               *read_grid<openvdb::Int32Grid>(file, "color_count", where));
   for (int slot = 0; slot < map.classes.size(); ++slot)
-    if (const std::string name = "evidence/" + map.classes.at_slot(slot).name; file.hasGrid(name))
+    if (const std::string name = evidence_name(map, slot); file.hasGrid(name))
       add_evidence(map, slot, *read_grid<openvdb::FloatGrid>(file, name, where));
   map.properties = header.properties;
   map.touches = header.touches;
@@ -106,7 +51,7 @@ Map read_map(const fs::path& path) {
     if (!map.properties.index_of(touch.request.property))
       throw FormatError(describe_mismatch(where, "touch " + id_text(touch.id), "a property of the map's table",
                                           "'" + touch.request.property + "'"));
-    touch.region = region_of(*read_grid<openvdb::MaskGrid>(file, region_name(touch), where));
+    touch.region = region_of(*read_grid<openvdb::MaskGrid>(file, touch_region_name(touch), where));
   }
   rebuild_touch_planes(map);
   if (const std::string hash = map_hash(map); hash != header.hash)
@@ -118,25 +63,12 @@ Map read_map(const fs::path& path) {
 
 void save_map(const Map& map, const fs::path& path, const SaveOptions& options) {
   openvdb::initialize();
-  AtomicFile file(path);
-  const auto failed = [&] { return IoError(path.string() + ": cannot write: " + std::strerror(errno)); };
-  std::vector<char> buffer(1 << 20);
-  std::ofstream os;
-  os.rdbuf()->pubsetbuf(buffer.data(), std::streamsize(buffer.size()));
-  os.open(file.path(), std::ios::binary | std::ios::in | std::ios::out);
-  const auto grids = grids_of(map);
+  const std::vector<MapGrid> grids = map_grids(map);
   const std::string hash = map_hash(map);
-  VdbWriter writer(os, to_metadata(map, hash), int32_t(grids.size()), vdb_flags(options.compression), hash);
-  for (const auto& make : grids) {
-    writer.write(*make());
-    // A full disk shows here, not after the remaining grids.
-    if (!os.good()) throw failed();
-  }
-  if (!os.flush()) throw failed();
-  os << make_map_trailer(file.path(), kMapFileVersion);
-  os.close();
-  if (!os) throw failed();
-  file.commit();
+  VdbFile file(path, to_metadata(map, hash), grids.size(), hash);
+  for (const MapGrid& grid : grids) file.write(*grid.make(), options.compression, grid.noisy);
+  file.flush();
+  file.commit(make_map_trailer(file.written(), kMapFileVersion));
 }
 
 Map load_map(const fs::path& path) {

@@ -31,6 +31,7 @@ struct SequenceInfo {
   bool has_color = false, has_labels = false, has_probabilities = false, has_instances = false;
   ClassTable classes;              ///< empty where the sequence brings none
   int64_t recorded_frames = 0;     ///< before the selection of frames
+  std::string fingerprint;         ///< of the recording, wherever it lies and whatever of it is selected
   std::vector<std::string> notes;  ///< what was assumed or repaired, one sentence each
 };
 

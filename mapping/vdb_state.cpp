@@ -71,16 +71,17 @@ openvdb::Int32Grid::Ptr color_count_grid(const Map& map) {
   });
 }
 
+std::string evidence_name(const Map& map, int slot) { return "evidence/" + map.classes.at_slot(slot).name; }
+
 openvdb::FloatGrid::Ptr evidence_grid(const Map& map, int slot) {
-  auto grid = state_grid<openvdb::FloatGrid>(map, "evidence/" + map.classes.at_slot(slot).name,
-                                             [slot](const Block& block, float* out) {
-                                               for (const EvidencePlane& plane : block.evidence)
-                                                 if (plane.slot == slot) {
-                                                   std::copy_n(plane.counts->value, kBlockVoxels, out);
-                                                   return true;
-                                                 }
-                                               return false;
-                                             });
+  auto grid = state_grid<openvdb::FloatGrid>(map, evidence_name(map, slot), [slot](const Block& block, float* out) {
+    for (const EvidencePlane& plane : block.evidence)
+      if (plane.slot == slot) {
+        std::copy_n(plane.counts->value, kBlockVoxels, out);
+        return true;
+      }
+    return false;
+  });
   return grid->tree().leafCount() == 0 ? nullptr : grid;
 }
 

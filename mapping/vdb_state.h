@@ -2,6 +2,8 @@
 
 #include <openvdb/openvdb.h>
 
+#include <string>
+
 #include "mapping/map.h"
 
 namespace felt {
@@ -12,6 +14,8 @@ namespace felt {
 
 /// Observations per voxel of the colour average; a leaf for each block that has colour planes.
 openvdb::Int32Grid::Ptr color_count_grid(const Map& map);
+/// "evidence/<class>"
+std::string evidence_name(const Map& map, int slot);
 /// Evidence of one class above its prior; null where no block has a plane of it.
 openvdb::FloatGrid::Ptr evidence_grid(const Map& map, int slot);
 

@@ -1,0 +1,87 @@
+#include "apps/checkpoint.h"
+
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+#include "core/error.h"
+#include "io/map_file.h"
+
+namespace felt::apps {
+namespace {
+
+using nlohmann::json;
+
+// Keys of Map::metadata.
+constexpr const char* kConfig = "config";
+constexpr const char* kProgress = "progress";
+
+json progress_of(const FusionRecord& record, const std::string& recording) {
+  return {{"recording", recording}, {"read", record.read}, {"fused", record.fused}, {"skipped", record.skipped}};
+}
+
+json text_of(const Map& map, const char* key, const std::string& where) {
+  const auto found = map.metadata.find(key);
+  const json text = found == map.metadata.end() ? json() : json::parse(found->second, nullptr, false);
+  if (!text.is_object())
+    throw FormatError(
+        describe_mismatch(where, std::string("text '") + key + "'", "that of a map of reconstruct",
+                          found == map.metadata.end() ? "none: not a map that can be continued" : "something else"));
+  return text;
+}
+
+FusionRecord record_of(const json& progress, const std::string& where) {
+  try {
+    FusionRecord record;
+    progress.at("read").get_to(record.read);
+    progress.at("fused").get_to(record.fused);
+    progress.at("skipped").get_to(record.skipped);
+    return record;
+  } catch (const json::exception& fault) {
+    throw FormatError(describe_mismatch(where, "text 'progress'", "frames read, fused and skipped", fault.what()));
+  }
+}
+
+/// The path of a recording may be spelled in another way: its fingerprint is compared instead.
+void require_same_run(const json& then, const json& now, const std::string& where) {
+  std::set<std::string> keys;
+  for (const json* config : {&then, &now})
+    for (const auto& [key, value] : config->items()) keys.insert(key);
+  keys.erase("sequence");
+  std::vector<std::string> problems;
+  for (const std::string& key : keys)
+    if (const json was = then.value(key, json()), is = now.value(key, json()); was != is)
+      problems.push_back(describe_mismatch("--resume", key, was.dump() + " as in " + where, is.dump()));
+  if (!problems.empty()) throw ConfigError(problems);
+}
+
+}  // namespace
+
+std::string fusion_settings(const nlohmann::ordered_json& config) {
+  nlohmann::ordered_json shaping = config;
+  for (const char* key : {"sequence", "frames", "labels", "probs", "classes", "properties", "touches"})
+    shaping.erase(key);
+  return shaping.dump();
+}
+
+void save_checkpoint(Map& map, const FusionRecord& record, const std::string& recording,
+                     const nlohmann::ordered_json& config, const std::filesystem::path& path) {
+  map.metadata[kConfig] = config.dump();
+  map.metadata[kProgress] = progress_of(record, recording).dump();
+  save_map(map, path);
+}
+
+std::optional<Checkpoint> resume(const std::filesystem::path& path, const std::string& recording,
+                                 const nlohmann::ordered_json& config) {
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  Map map = load_map(path);
+  const std::string where = path.string();
+  const json progress = text_of(map, kProgress, where);
+  if (progress.value("recording", json()) != recording)
+    throw ConfigError(describe_mismatch("--resume", "recording", "the one that " + where + " was made of", "another"));
+  require_same_run(text_of(map, kConfig, where), json(config), where);
+  FusionRecord record = record_of(progress, where);
+  return Checkpoint{std::move(map), std::move(record)};
+}
+
+}  // namespace felt::apps

@@ -1,0 +1,114 @@
+#include "io/map_grids.h"
+
+#include <algorithm>
+#include <set>
+
+#include "core/error.h"
+#include "io/vdb_file.h"
+#include "mapping/vdb_state.h"
+#include "mapping/vdb_touch.h"
+#include "mapping/vdb_views.h"
+
+namespace felt {
+namespace {
+
+/// Which classes have a plane anywhere, by slot.
+std::vector<int> observed_classes(const Map& map) {
+  std::vector<bool> seen(size_t(map.classes.size()), false);
+  for (const Block& block : map.store.blocks())
+    if (block.geometry->observed())
+      for (const EvidencePlane& plane : block.evidence) seen[plane.slot] = true;
+  std::vector<int> slots;
+  for (int slot = 0; slot < map.classes.size(); ++slot)
+    if (seen[size_t(slot)]) slots.push_back(slot);
+  return slots;
+}
+
+bool has_color(const Map& map) {
+  return std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
+                     [](const Block& block) { return block.color != nullptr; });
+}
+
+bool chosen(const std::string& name, const std::vector<std::string>& asked) {
+  return asked.empty() || std::any_of(asked.begin(), asked.end(), [&](const std::string& a) {
+           return name == a || (a.ends_with('/') && name.starts_with(a));
+         });
+}
+
+void require_known(const std::vector<MapGrid>& all, const std::vector<std::string>& asked) {
+  std::vector<std::string> problems;
+  std::string names;
+  for (const MapGrid& grid : all) names += (names.empty() ? "" : ", ") + grid.name;
+  for (const std::string& a : asked)
+    if (std::none_of(all.begin(), all.end(), [&](const MapGrid& grid) { return chosen(grid.name, {a}); }))
+      problems.push_back(describe_mismatch("--grids", "grid of the map", "one of " + names, "'" + a + "'"));
+  if (!problems.empty()) throw ConfigError(problems);
+}
+
+/// Switches off what lies outside the region, and drops leaves that hold nothing then.
+template <typename Grid>
+void clip(Grid& grid, const Region& region) {
+  using Leaf = typename Grid::TreeType::LeafNodeType;
+  std::vector<openvdb::Coord> outside;
+  for (auto leaf = grid.tree().beginLeaf(); leaf; ++leaf) {
+    const openvdb::Coord o = leaf->origin();
+    const BlockMask* inside = region.find(block_of_voxel({o.x(), o.y(), o.z()}));
+    for (openvdb::Index i = 0; i < Leaf::SIZE; ++i)
+      if (inside == nullptr || !inside->test(int(i))) leaf->setValueOff(i, grid.background());
+    if (leaf->getValueMask().isOff()) outside.push_back(o);
+  }
+  for (const openvdb::Coord& o : outside) delete grid.tree().template stealNode<Leaf>(o, grid.background(), false);
+}
+
+openvdb::GridBase::Ptr clipped(const Map& map, const openvdb::GridBase::Ptr& grid, const Region& region) {
+  if (const auto mask = openvdb::gridPtrCast<openvdb::MaskGrid>(grid))
+    return region_grid(map, intersected(region_of(*mask), region), grid->getName());
+  if (const auto values = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) clip(*values, region);
+  if (const auto values = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid)) clip(*values, region);
+  if (const auto values = openvdb::gridPtrCast<openvdb::Int32Grid>(grid)) clip(*values, region);
+  return grid;
+}
+
+}  // namespace
+
+std::vector<MapGrid> map_grids(const Map& map) {
+  std::vector<MapGrid> grids;
+  grids.push_back({"tsdf", [&] { return tsdf_grid(map); }, true});
+  grids.push_back({"weight", [&] { return weight_grid(map); }, true});
+  if (has_color(map)) {
+    grids.push_back({"color", [&] { return color_grid(map); }, true});
+    grids.push_back({"color_count", [&] { return color_count_grid(map); }});
+  }
+  for (const int slot : observed_classes(map))
+    grids.push_back({evidence_name(map, slot), [&map, slot] { return evidence_grid(map, slot); }});
+  for (const Touch& touch : map.touches.touches)
+    grids.push_back({touch_region_name(touch),
+                     [&map, &touch] { return region_grid(map, touch.region, touch_region_name(touch)); }});
+  // Views of the touched voxels are small: they are made once.
+  for (const openvdb::GridBase::Ptr& grid : touch_grids(map))
+    grids.push_back({grid->getName(), [grid] { return grid; }});
+  return grids;
+}
+
+std::vector<std::string> export_vdb(const Map& map, const std::filesystem::path& path, const VdbExport& options) {
+  openvdb::initialize();
+  std::vector<MapGrid> grids = map_grids(map);
+  require_known(grids, options.grids);
+  std::erase_if(grids, [&](const MapGrid& grid) { return !chosen(grid.name, options.grids); });
+  openvdb::MetaMap metadata;
+  metadata.insertMeta("creator", openvdb::StringMetadata("feltmap export"));
+  metadata.insertMeta("map_hash", openvdb::StringMetadata(map_hash(map)));
+  VdbFile file(path, metadata, grids.size(), map_hash(map));
+  std::vector<std::string> names;
+  for (const MapGrid& grid : grids) {
+    openvdb::GridBase::Ptr made = grid.make();
+    if (options.part != nullptr) made = clipped(map, made, *options.part);
+    made->setSaveFloatAsHalf(options.half);
+    file.write(*made, MapCompression::zip, grid.noisy);
+    names.push_back(grid.name);
+  }
+  file.commit("");
+  return names;
+}
+
+}  // namespace felt
