@@ -1,7 +1,7 @@
 #include "io/map_grids.h"
 
 #include <algorithm>
-#include <set>
+#include <memory>
 
 #include "core/error.h"
 #include "io/vdb_file.h"
@@ -11,23 +11,6 @@
 
 namespace felt {
 namespace {
-
-/// Which classes have a plane anywhere, by slot.
-std::vector<int> observed_classes(const Map& map) {
-  std::vector<bool> seen(size_t(map.classes.size()), false);
-  for (const Block& block : map.store.blocks())
-    if (block.geometry->observed())
-      for (const EvidencePlane& plane : block.evidence) seen[plane.slot] = true;
-  std::vector<int> slots;
-  for (int slot = 0; slot < map.classes.size(); ++slot)
-    if (seen[size_t(slot)]) slots.push_back(slot);
-  return slots;
-}
-
-bool has_color(const Map& map) {
-  return std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
-                     [](const Block& block) { return block.color != nullptr; });
-}
 
 bool chosen(const std::string& name, const std::vector<std::string>& asked) {
   return asked.empty() || std::any_of(asked.begin(), asked.end(), [&](const std::string& a) {
@@ -75,12 +58,15 @@ std::vector<MapGrid> map_grids(const Map& map) {
   std::vector<MapGrid> grids;
   grids.push_back({"tsdf", [&] { return tsdf_grid(map); }, true});
   grids.push_back({"weight", [&] { return weight_grid(map); }, true});
-  if (has_color(map)) {
+  const auto lists = std::make_shared<const BlockLists>(block_lists(map));
+  if (!lists->color.empty()) {
     grids.push_back({"color", [&] { return color_grid(map); }, true});
-    grids.push_back({"color_count", [&] { return color_count_grid(map); }});
+    grids.push_back({"color_count", [&map, lists] { return color_count_grid(map, lists->color); }});
   }
-  for (const int slot : observed_classes(map))
-    grids.push_back({evidence_name(map, slot), [&map, slot] { return evidence_grid(map, slot); }});
+  for (int slot = 0; slot < map.classes.size(); ++slot)
+    if (const auto& blocks = lists->evidence[size_t(slot)]; !blocks.empty())
+      grids.push_back(
+          {evidence_name(map, slot), [&map, lists, slot, &blocks] { return evidence_grid(map, slot, blocks); }});
   for (const Touch& touch : map.touches.touches)
     grids.push_back({touch_region_name(touch),
                      [&map, &touch] { return region_grid(map, touch.region, touch_region_name(touch)); }});

@@ -17,8 +17,7 @@
 #include <functional>
 
 #include "io/map_file.h"
-#include "mapping/vdb_state.h"
-#include "mapping/vdb_views.h"
+#include "io/map_grids.h"
 
 namespace {
 
@@ -98,9 +97,8 @@ void measure(const Map& map, MapCompression compression, const char* name, const
   const double load_s = median_of_five_s([&] { (void)load_map(path); });
   require_same(load_map(path), map);
   // OpenVDB alone: the same grids, made beforehand.
-  openvdb::GridPtrVec grids{tsdf_grid(map), weight_grid(map), color_grid(map), color_count_grid(map)};
-  for (int slot = 0; slot < map.classes.size(); ++slot)
-    if (auto grid = evidence_grid(map, slot)) grids.push_back(grid);
+  openvdb::GridPtrVec grids;
+  for (const MapGrid& grid : map_grids(map)) grids.push_back(grid.make());
   const double write_s = median_of_five_s([&] {
     std::ofstream os(stock, std::ios::binary);
     openvdb::io::Stream stream(os);

@@ -159,32 +159,35 @@ void read_touch_journal(const std::string& bytes) {
   require(touch_journal_json(parse_touch_journal(text, "written")) == text, "a touch journal changes when written");
 }
 
-// Text: a word of a few bytes may become a node of a document or a row of numbers. Images: a byte of deflate is up to
-// 1032 bytes, which are eight pixels each at one bit a pixel, which are four bytes each as colour.
-constexpr size_t kText = 2000, kImage = size_t(1032) * 8 * 6;
+// Decoders keep buffers of a fixed size. Text: a word of a few bytes may become a node of a document or a row of
+// numbers. Images: a byte of deflate is up to 1032 bytes, which are eight pixels each at one bit a pixel, which are
+// four bytes each as colour.
+constexpr size_t kFree = size_t(16) << 20, kText = 2000, kImage = size_t(1032) * 8 * 6;
+// Map: a leaf of 130 bytes becomes planes of up to 4 KiB; the journal may name ten million frames in a few bytes.
+constexpr size_t kMapFree = size_t(128) << 20, kMap = 200;
 
 constexpr Harness kHarnesses[] = {
-    {"camera", read_camera, kText},
-    {"classes_csv", read_classes_csv, kText},
-    {"classes_yaml", read_classes_yaml, kText},
-    {"config", read_config, kText},
-    {"confusion", read_confusion, kText},
-    {"frames", read_frames, kText},
-    {"friction", read_friction, kText},
-    {"image", read_image, kImage},
-    {"infer", read_infer, kText},
-    {"map", read_map, kText},
-    {"obj", read_obj, kText},
-    {"ply", read_ply, kText},
-    {"points", read_point_list, kText},
-    {"poses", read_poses_text, kText},
-    {"priors", read_priors, kText},
-    {"properties", read_properties_yaml, kText},
-    {"scene", read_scene_yaml, kText},
-    {"sens", read_sens, kImage},
-    {"sequence", read_sequence_yaml, kText},
-    {"touch_journal", read_touch_journal, kText},
-    {"touches", read_touches_csv, kText},
+    {"camera", read_camera, kFree, kText},
+    {"classes_csv", read_classes_csv, kFree, kText},
+    {"classes_yaml", read_classes_yaml, kFree, kText},
+    {"config", read_config, kFree, kText},
+    {"confusion", read_confusion, kFree, kText},
+    {"frames", read_frames, kFree, kText},
+    {"friction", read_friction, kFree, kText},
+    {"image", read_image, kFree, kImage},
+    {"infer", read_infer, kFree, kText},
+    {"map", read_map, kMapFree, kMap},
+    {"obj", read_obj, kFree, kText},
+    {"ply", read_ply, kFree, kText},
+    {"points", read_point_list, kFree, kText},
+    {"poses", read_poses_text, kFree, kText},
+    {"priors", read_priors, kFree, kText},
+    {"properties", read_properties_yaml, kFree, kText},
+    {"scene", read_scene_yaml, kFree, kText},
+    {"sens", read_sens, kFree, kImage},
+    {"sequence", read_sequence_yaml, kFree, kText},
+    {"touch_journal", read_touch_journal, kFree, kText},
+    {"touches", read_touches_csv, kFree, kText},
 };
 
 }  // namespace

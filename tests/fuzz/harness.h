@@ -12,12 +12,9 @@ namespace felt::fuzz {
 struct Harness {
   const char* name;  ///< also its folder of seeds, tests/fuzz/corpus/<name>
   void (*read)(const std::string& bytes);
-  /// Most memory that reading may take for each byte of input, beyond kFreeBytes.
-  size_t bytes_per_byte;
+  /// Most memory that reading may take: so much whatever the input, and so much for each byte of it.
+  size_t free_bytes, bytes_per_byte;
 };
-
-/// Memory that any reader may take whatever the size of its input.
-inline constexpr size_t kFreeBytes = size_t(32) << 20;
 
 /// Every harness, in ascending order of names.
 std::span<const Harness> harnesses();

@@ -107,7 +107,8 @@ TEST_CASE("every reader accepts a seed, and refuses or accepts each seed and fin
     for (const Seed& seed : seeds) {
       INFO(seed.name);
       bool was_accepted = false;
-      CHECK(peak_bytes(harness, seed.bytes, was_accepted) <= kFreeBytes + harness.bytes_per_byte * seed.bytes.size());
+      CHECK(peak_bytes(harness, seed.bytes, was_accepted) <=
+            harness.free_bytes + harness.bytes_per_byte * seed.bytes.size());
       taken += was_accepted;
     }
     CHECK(taken > 0);
@@ -127,7 +128,7 @@ TEST_CASE("damaged copies of every seed are refused or accepted, within bounded 
         const std::string bytes = damaged(seed.bytes, engine);
         bool was_accepted = false;
         const size_t most = peak_bytes(harness, bytes, was_accepted);
-        if (most > kFreeBytes + harness.bytes_per_byte * bytes.size()) {
+        if (most > harness.free_bytes + harness.bytes_per_byte * bytes.size()) {
           std::ofstream("fuzz-finding", std::ios::binary) << bytes;
           FAIL(seed.name << ", damage " << n << ": " << most << " bytes for " << bytes.size()
                          << ", kept as fuzz-finding");
