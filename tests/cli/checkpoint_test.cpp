@@ -103,14 +103,15 @@ TEST_CASE("a run that was interrupted goes on with --resume to the same map") {
   const fs::path sequence = boxes_repeated(folder.path() / "sequence", 100), out = folder.path() / "out",
                  whole = folder.path() / "whole";
   const CommandResult stopped =
-      run_feltmap_within("", reconstruct(sequence, out), " & sleep 0.4; kill -INT $!; wait $!");
+      run_feltmap_within("", reconstruct(sequence, out, "--checkpoint 10"),
+                         " & until [ -e " + quoted(out / "map.vdb") + " ]; do sleep 0.02; done; kill -INT $!; wait $!");
   INFO(stopped.err);
   REQUIRE(stopped.exit_code == 5);
   CHECK_THAT(stopped.err, Catch::Matchers::Contains("--resume"));
   const int64_t read = frames_in(out / "map.vdb");
   CHECK(read > 0);
   CHECK(read < 1200);
-  REQUIRE(run_feltmap(reconstruct(sequence, out, "--resume")).exit_code == 0);
+  REQUIRE(run_feltmap(reconstruct(sequence, out, "--checkpoint 10 --resume")).exit_code == 0);
   REQUIRE(run_feltmap(reconstruct(sequence, whole)).exit_code == 0);
   const json report = json::parse(file_text(out / "report.json"));
   CHECK(report.at("frames").at("resumed_after") == read);

@@ -112,16 +112,16 @@ TEST_CASE("a target that is a device or a missing folder is refused by name") {
   const std::string map = quoted(folder.path() / "map.vdb");
   require_refused("merge " + map + " --out /dev/full", "/dev/full");
   require_refused("merge " + map + " --out " + quoted(folder.path() / "absent/map.vdb"), "absent/map.vdb");
-  require_refused("export " + map + " --points /dev/full --force", "/dev/full");
+  require_refused("export " + map + " --vdb /dev/full --force", "/dev/full");
   CHECK(fs::exists("/dev/full"));
 }
 
 TEST_CASE("an output folder that vanishes while frames are fused is an error that names it") {
   const TemporaryDirectory folder;
-  const fs::path sequence = boxes_repeated(folder.path() / "sequence", 60), out = folder.path() / "out";
+  const fs::path sequence = boxes_repeated(folder.path() / "sequence", 300), out = folder.path() / "out";
   const CommandResult result = run_feltmap_within(
       "", "reconstruct " + quoted(sequence) + " --out " + quoted(out) + " --quiet --checkpoint 50 --voxel-size 0.04",
-      " & sleep 0.3; rm -rf " + quoted(out) + "; wait $!");
+      " & until [ -e " + quoted(out / "map.vdb") + " ]; do sleep 0.02; done; rm -rf " + quoted(out) + "; wait $!");
   INFO(result.err);
   CHECK(result.exit_code == 4);
   CHECK_THAT(result.err, Contains(out.string()) && Contains("No such file or directory"));
