@@ -16,8 +16,17 @@ using nlohmann::json;
 constexpr const char* kConfig = "config";
 constexpr const char* kProgress = "progress";
 
-json progress_of(const FusionRecord& record, const std::string& recording) {
-  return {{"recording", recording}, {"read", record.read}, {"fused", record.fused}, {"skipped", record.skipped}};
+json progress_of(const FusionRecord& record, bool complete, const std::string& recording) {
+  json unknown = json::array();
+  for (const auto& [id, pixels] : record.unknown_ids) unknown.push_back({id, pixels});
+  return {{"recording", recording},
+          {"complete", complete},
+          {"read", record.read},
+          {"fused", record.fused},
+          {"skipped", record.skipped},
+          {"label_voxels", {record.labels.voxels, record.labels.unknown, record.labels.invalid}},
+          {"unknown_ids", unknown},
+          {"ignored_pixels", record.ignored_pixels}};
 }
 
 json text_of(const Map& map, const char* key, const std::string& where) {
@@ -36,9 +45,14 @@ FusionRecord record_of(const json& progress, const std::string& where) {
     progress.at("read").get_to(record.read);
     progress.at("fused").get_to(record.fused);
     progress.at("skipped").get_to(record.skipped);
+    const json& labels = progress.at("label_voxels");
+    record.labels = {labels.at(0).get<uint64_t>(), labels.at(1).get<uint64_t>(), labels.at(2).get<uint64_t>()};
+    for (const json& row : progress.at("unknown_ids"))
+      record.unknown_ids[row.at(0).get<uint16_t>()] = row.at(1).get<uint64_t>();
+    progress.at("ignored_pixels").get_to(record.ignored_pixels);
     return record;
   } catch (const json::exception& fault) {
-    throw FormatError(describe_mismatch(where, "text 'progress'", "frames read, fused and skipped", fault.what()));
+    throw FormatError(describe_mismatch(where, "text 'progress'", "what reconstruct counts", fault.what()));
   }
 }
 
@@ -64,10 +78,10 @@ std::string fusion_settings(const nlohmann::ordered_json& config) {
   return shaping.dump();
 }
 
-void save_checkpoint(Map& map, const FusionRecord& record, const std::string& recording,
+void save_checkpoint(Map& map, const FusionRecord& record, bool complete, const std::string& recording,
                      const nlohmann::ordered_json& config, const std::filesystem::path& path) {
   map.metadata[kConfig] = config.dump();
-  map.metadata[kProgress] = progress_of(record, recording).dump();
+  map.metadata[kProgress] = progress_of(record, complete, recording).dump();
   save_map(map, path);
 }
 
@@ -81,7 +95,8 @@ std::optional<Checkpoint> resume(const std::filesystem::path& path, const std::s
     throw ConfigError(describe_mismatch("--resume", "recording", "the one that " + where + " was made of", "another"));
   require_same_run(text_of(map, kConfig, where), json(config), where);
   FusionRecord record = record_of(progress, where);
-  return Checkpoint{std::move(map), std::move(record)};
+  const bool complete = progress.value("complete", json()) == true;
+  return Checkpoint{std::move(map), std::move(record), complete};
 }
 
 }  // namespace felt::apps

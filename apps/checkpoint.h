@@ -19,13 +19,15 @@ namespace felt::apps {
 std::string fusion_settings(const nlohmann::ordered_json& config);
 
 /// Writes the map with all that `resume` needs. `recording`: SequenceInfo::fingerprint. `config`: settings as used.
-void save_checkpoint(Map& map, const FusionRecord& record, const std::string& recording,
+/// `complete`: nothing is left to do for this map but to mesh it; its recorded touches are in it.
+void save_checkpoint(Map& map, const FusionRecord& record, bool complete, const std::string& recording,
                      const nlohmann::ordered_json& config, const std::filesystem::path& path);
 
 /// Where an earlier run ended.
 struct Checkpoint {
   Map map;
-  FusionRecord record;  ///< frames read, fused and skipped; no times
+  FusionRecord record;  ///< what was counted; no times
+  bool complete = false;
 };
 
 /// What `save_checkpoint` wrote; nothing where there is no such file. Throws ConfigError that names every setting that

@@ -12,6 +12,7 @@ void add_info(CLI::App& app);
 void add_export(CLI::App& app);
 void add_render(CLI::App& app);
 void add_evaluate(CLI::App& app);
+void add_calibrate_labels(CLI::App& app);
 void add_touch(CLI::App& app);
 void add_region(CLI::App& app);
 void add_query(CLI::App& app);

@@ -18,8 +18,9 @@ struct FrameSource {
 
 /// Fuses frames in recorded order while later ones are decoded, notes each in the map's journal and goes on with
 /// `record`. `after_frame` is called with the record after every frame, fused or skipped; a text that is not empty ends
-/// fusion there, with that reason: what was fused stays.
-void fuse_sequence(DecodeAhead& frames, const FrameSource& source, const IntegrationConfig& config, Map& map,
-                   FusionRecord& record, const std::function<std::string(const FusionRecord&)>& after_frame);
+/// fusion there, with that reason: what was fused stays. Pixels of `ignored_ids` leave no trace.
+void fuse_sequence(DecodeAhead& frames, const FrameSource& source, const IntegrationConfig& config,
+                   const std::vector<uint16_t>& ignored_ids, Map& map, FusionRecord& record,
+                   const std::function<std::string(const FusionRecord&)>& after_frame);
 
 }  // namespace felt::apps

@@ -61,7 +61,7 @@ Json describe_map(const fs::path& file, bool with_grids) {
   if (!bounds_m.isEmpty())
     json["bounds_m"] = {{"min", vector_json(bounds_m.min())}, {"max", vector_json(bounds_m.max())}};
   json["bytes"] = {
-      {"tsdf", map.store.geometry_bytes()}, {"color", map.store.color_bytes()}, {"classes", map.store.plane_bytes()}};
+      {"tsdf", map.store.geometry_bytes()}, {"color", map.store.color_bytes()}, {"classes", class_bytes(map)}};
   json["frames"] = frame_count(map.frames);
   json["touches"] = map.touches.touches.size();
   json["classes"] = classes_json(map.classes);

@@ -29,6 +29,7 @@ void add_commands(CLI::App& app) {
   add_simulate(app);
   add_render(app);
   add_evaluate(app);
+  add_calibrate_labels(app);
   add_touch(app);
   add_region(app);
   add_query(app);

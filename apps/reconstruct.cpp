@@ -15,9 +15,11 @@
 #include "apps/exit_code.h"
 #include "apps/fuse_sequence.h"
 #include "apps/interrupt.h"
+#include "apps/label_options.h"
 #include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/reconstruct_options.h"
+#include "apps/recorded_touches.h"
 #include "core/error.h"
 #include "core/simd.h"
 #include "io/atomic_file.h"
@@ -27,6 +29,7 @@
 #include "io/system_memory.h"
 #include "mapping/marching_cubes.h"
 #include "mapping/size_estimate.h"
+#include "mapping/touch_update.h"
 
 namespace felt::apps {
 namespace {
@@ -92,19 +95,21 @@ void try_checkpoint(const std::function<void()>& save, int64_t frames) {
 
 /// Fuses what the record has not read yet.
 void fuse(const SequenceReader& sequence, const FrameSource& source, const ReconstructOptions& options,
-          const CommonOptions& common, const InterruptGuard& interrupt, const std::function<void()>& save, Map& map,
-          FusionRecord& record) {
+          const std::vector<uint16_t>& ignored_ids, const CommonOptions& common, const InterruptGuard& interrupt,
+          const std::function<void()>& save, Map& map, FusionRecord& record) {
   ProgressBar progress("frames", sequence.size(), !common.quiet);
   DecodeAhead frames(sequence, {.threads = common.thread_count(), .first = record.read});
-  fuse_sequence(frames, source, options.fusion, map, record, [&](const FusionRecord& so_far) -> std::string {
-    progress.update(so_far.read);
-    if (interrupt.requested()) return "interrupted";
-    constexpr int64_t kMemoryCheckEvery = 32;
-    if (so_far.read % kMemoryCheckEvery == 0 && memory_runs_out(map)) return "out of memory";
-    if (options.checkpoint_every > 0 && so_far.read % options.checkpoint_every == 0 && so_far.read < sequence.size())
-      try_checkpoint(save, so_far.read);
-    return {};
-  });
+  fuse_sequence(frames, source, options.fusion, ignored_ids, map, record,
+                [&](const FusionRecord& so_far) -> std::string {
+                  progress.update(so_far.read);
+                  if (interrupt.requested()) return "interrupted";
+                  constexpr int64_t kMemoryCheckEvery = 32;
+                  if (so_far.read % kMemoryCheckEvery == 0 && memory_runs_out(map)) return "out of memory";
+                  if (options.checkpoint_every > 0 && so_far.read % options.checkpoint_every == 0 &&
+                      so_far.read < sequence.size())
+                    try_checkpoint(save, so_far.read);
+                  return {};
+                });
   record.decode_s = frames.decode_s();
   record.wait_s = frames.wait_s();
 }
@@ -151,15 +156,25 @@ void print_summary(const ReconstructReport& report, const fs::path& folder) {
               report.active_voxels, report.mesh_triangles);
   for (const auto& [reason, count] : fusion.skipped)
     std::printf("  skipped %lld: %s\n", static_cast<long long>(count), reason.c_str());
+  if (!fusion.unknown_ids.empty()) {
+    std::string ids;
+    for (const auto& [id, pixels] : fusion.unknown_ids) ids += (ids.empty() ? "" : ", ") + std::to_string(id);
+    std::printf("  labels that the class table does not know, not fused: %s\n", ids.c_str());
+  }
+  if (fusion.labels.invalid > 0)
+    std::printf("  %llu observations of probabilities that are no distribution, not fused\n",
+                static_cast<unsigned long long>(fusion.labels.invalid));
   for (const char* name : {kMapName, kMeshName, kReportName}) std::printf("  %s\n", (folder / name).c_str());
 }
 
 int run(const ReconstructArguments& arguments, CommonOptions common) {
   const auto start = Clock::now();
-  const ReconstructOptions options = resolve(arguments, common.threads);
+  ReconstructOptions options = resolve(arguments, common.threads);
   common.threads = options.threads;
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(common.thread_count()));
   const auto sequence = open_sequence(options.sequence, options.reading);
+  const PreparedClasses classes = prepare_classes(options.labels, sequence->info().classes);
+  const TouchPlan touches = plan_touches(options, *sequence, classes.table);
   prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite || options.resume);
   check_memory(*sequence, options);
 
@@ -167,38 +182,59 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   const FrameSource source{sequence->info().fingerprint, fusion_settings(config)};
   ReconstructReport report;
   Map map(options.voxel_size_m, options.truncation_m);
-  map.classes = sequence->info().classes;
+  map.classes = classes.table;
+  map.properties = touches.properties;
+  options.fusion.labels.likelihood = classes.likelihood.get();
+  bool complete = false;
   if (options.resume)
     if (auto earlier = resume(options.out / kMapName, source.recording, config)) {
       map = std::move(earlier->map);
       report.fusion = std::move(earlier->record);
       report.resumed_after = report.fusion.read;
+      complete = earlier->complete;
     }
-  const auto save = [&] { save_checkpoint(map, report.fusion, source.recording, config, options.out / kMapName); };
+  const auto save = [&] {
+    save_checkpoint(map, report.fusion, complete, source.recording, config, options.out / kMapName);
+  };
   const InterruptGuard interrupt;
-  fuse(*sequence, source, options, common, interrupt, save, map, report.fusion);
+  fuse(*sequence, source, options, classes.ignored_ids, common, interrupt, save, map, report.fusion);
   if (report.fusion.fused == 0 && report.fusion.stopped.empty())
     throw FormatError(describe_mismatch(options.sequence.string(), "frames", "at least one that can be fused",
                                         nothing_fused(report.fusion)));
 
+  // An interrupted run may go on: its touches come with its last frame.
+  std::vector<TouchOutcome> touched;
+  if (report.fusion.stopped.empty() && !complete) {
+    const auto start_touch = Clock::now();
+    touched = apply_touches(map, touches);
+    report.touch_s = seconds_since(start_touch);
+    complete = true;
+  }
   write_results(map, save, options.out, common.thread_count(), report);
   report.voxel_size_m = options.voxel_size_m, report.truncation_m = options.truncation_m;
   report.blocks = map.store.size();
   report.active_voxels = active_voxel_count(map);
   report.tsdf_bytes = map.store.geometry_bytes(), report.color_bytes = map.store.color_bytes();
-  report.class_bytes = map.store.plane_bytes();
+  report.property_bytes = touch_plane_bytes(map) + journal_bytes(map.touches);
+  report.classes = map.classes.size();
+  report.class_bytes = class_bytes(map);
+  report.instance_bytes = map.store.instance_bytes();
   report.threads = common.thread_count();
   report.simd = simd_name();
   report.peak_rss_bytes = peak_resident_bytes();
   report.total_s = seconds_since(start);
-  const std::string json = to_json(report, config).dump(2) + "\n";
+  nlohmann::ordered_json document = to_json(report, config);
+  if (!touches.file.empty()) document["touches"] = touches_json(touches, touched);
+  const std::string json = document.dump(2) + "\n";
   write_file_atomically(options.out / kReportName, json);
 
   if (common.json) {
     std::fputs(json.c_str(), stdout);
   } else if (!common.quiet) {
     print_summary(report, options.out);
+    if (!touched.empty()) std::printf("  %zu touches recorded with the sequence\n", touched.size());
   }
+  print_refused(touches, touched);
   const FusionRecord& fusion = report.fusion;
   if (fusion.stopped.empty()) return kDone;
   std::fprintf(stderr,

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "apps/label_options.h"
 #include "core/error.h"
 #include "io/reconstruct_config.h"
 
@@ -51,6 +52,7 @@ public:
               const std::string& found) {
     if (!good) messages_.push_back(describe_mismatch(where, what, expected, found));
   }
+  void add(const std::string& message) { messages_.push_back(message); }
   void throw_if_any() const {
     if (!messages_.empty()) throw ConfigError(messages_);
   }
@@ -104,8 +106,15 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
       ->group(reading);
   command.add_option("--max-dt", a.max_dt_s, "Largest difference of stamps within a frame, seconds")->group(reading);
   command.add_option("--labels", a.labels, "Folder of label images")->group(reading);
-  command.add_option("--probs", a.probs, "Folder of class probability images")->group(reading);
-  command.add_option("--classes", a.classes, "Class table (classes.yaml)")->group(reading);
+  command
+      .add_option("--probs", a.probs,
+                  "Folder of class probability images (docs/semantics.md), or of confidences beside --labels")
+      ->group(reading);
+  command.add_option("--classes", a.classes, "Class table (classes.yaml, or a CSV of id and name)")->group(reading);
+  command.add_option("--properties", a.properties, "Property table (properties.yaml)")->group(reading);
+  command.add_option("--touches", a.touches, "Recorded touches (touches.csv), each at its stamp or frame")
+      ->group(reading);
+  add_label_options(command, a.label_settings);
   command.add_flag("--no-color", a.no_color, "Do not read colour images")->group(reading);
 }
 
@@ -122,6 +131,8 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   reading.format = a.format.empty() ? file.format.value_or("") : a.format;
   reading.labels_dir = a.labels.empty() ? file.labels : a.labels;
   reading.probs_dir = a.probs.empty() ? file.probs : a.probs;
+  options.properties = a.properties.empty() ? file.properties : a.properties;
+  options.touches = a.touches.empty() ? file.touches : a.touches;
   reading.classes_file = a.classes.empty() ? file.classes : a.classes;
   reading.intrinsics = file.intrinsics;
   reading.pose_convention = file.pose_convention;
@@ -171,6 +182,10 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
                   "a number above the smallest depth, " + text_of(fusion.min_depth_m), text_of(fusion.max_depth_m));
   problems.expect(fusion.max_weight >= 1, "--max-weight", "summed weight", "a number of at least 1",
                   text_of(fusion.max_weight));
+  options.labels = overlaid(a.label_settings, file.label_settings);
+  for (const std::string& problem : problems_of(options.labels)) problems.add(problem);
+  fusion.labels = label_config(options.labels);
+  reading.read_instances = fusion.labels.instances;
   problems.throw_if_any();
   return options;
 }
@@ -193,6 +208,8 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   if (!reading.labels_dir.empty()) json["labels"] = reading.labels_dir.string();
   if (!reading.probs_dir.empty()) json["probs"] = reading.probs_dir.string();
   if (!reading.classes_file.empty()) json["classes"] = reading.classes_file.string();
+  if (!options.properties.empty()) json["properties"] = options.properties.string();
+  if (!options.touches.empty()) json["touches"] = options.touches.string();
   json["max_dt_s"] = reading.max_dt_s;
   json["color"] = reading.read_color;
   json["voxel_size_m"] = options.voxel_size_m;
@@ -204,6 +221,7 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   json["max_weight"] = short_decimal(fusion.max_weight);
   json["dropoff_start_vox"] = short_decimal(fusion.dropoff_start_vox);
   json["carve"] = fusion.carve;
+  add_to_json(options.labels, fusion.labels, json);
   return json;
 }
 

@@ -5,6 +5,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "io/label_settings.h"
 #include "io/sequence_options.h"
 #include "mapping/integration_config.h"
 
@@ -14,9 +15,11 @@ namespace felt::apps {
 struct ReconstructOptions {
   std::filesystem::path sequence, out;
   SequenceOptions reading;
+  std::filesystem::path properties, touches;  ///< empty: what the sequence carries, if anything
   double voxel_size_m = 0.02;
   double truncation_m = 0.08;
   IntegrationConfig fusion;
+  LabelSettings labels;
   bool overwrite = false;
   int64_t checkpoint_every = 0;  ///< frames; 0: only at the end
   bool resume = false;           ///< go on with the map in `out`, where there is one
@@ -25,11 +28,12 @@ struct ReconstructOptions {
 
 /// The command line's own words. What is left empty keeps the default or the configuration file's value.
 struct ReconstructArguments {
-  std::filesystem::path config, sequence, out, labels, probs, classes;
+  std::filesystem::path config, sequence, out, labels, probs, classes, properties, touches;
   std::string format, intrinsics, pose_convention, depth_encoding, frames, truncation;
   std::optional<double> depth_scale, max_dt_s, voxel_size_m, min_depth_m, max_depth_m, max_weight;
   std::optional<DistanceModel> distance;
   std::optional<WeightModel> weight;
+  LabelSettings label_settings;
   bool ray_length = false, no_color = false, carve = false, overwrite = false, resume = false;
   int64_t checkpoint_every = 0;
 };

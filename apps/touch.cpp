@@ -10,7 +10,9 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/touch_options.h"
+#include "inference/decision.h"
 #include "io/map_file.h"
+#include "io/touch_json.h"
 #include "io/touches.h"
 
 namespace felt::apps {
@@ -21,7 +23,7 @@ using json = nlohmann::ordered_json;
 struct TouchOptions : CommonOptions {
   std::string map, at, property, file, out, undo, redo, properties, model = "material", projection = "kl";
   double value = 0, sigma = 0, rho = std::numeric_limits<double>::quiet_NaN(), stamp_s = 0;
-  bool dry_run = false;
+  bool dry_run = false, list = false;
   RegionOptions region;
 };
 
@@ -73,6 +75,37 @@ void print_effect(const Map& map, const TouchEffect& effect, const RegionSetting
   }
 }
 
+/// The journal, for people and (without region masks) for programs.
+int list_touches(const TouchOptions& options) {
+  const Map map = load_map(options.map);
+  if (options.json) {
+    json out;
+    out["map"] = options.map;
+    out["touches"] = json::parse(touch_journal_json(map.touches));
+    for (size_t t = 0; t < map.touches.touches.size(); ++t)
+      out["touches"][t]["voxels"] = map.touches.touches[t].region.voxels();
+    std::printf("%s\n", out.dump(2).c_str());
+    return kDone;
+  }
+  const auto text = [&](const BeliefSummary& belief) {
+    if (belief.class_probability.empty()) return std::string("?");
+    const int best = most_probable_class(belief.class_probability);
+    char numbers[64];
+    snprintf(numbers, sizeof numbers, " %.2f, %.3g +- %.3g", belief.class_probability[size_t(best)], belief.mean,
+             belief.sd);
+    return map.classes.at_slot(best).name + numbers;
+  };
+  for (const Touch& touch : map.touches.touches) {
+    const TouchRequest& r = touch.request;
+    std::printf("%s  %12.6f  %s %g at (%.3f, %.3f, %.3f), %zu voxels, %s%s\n    %s -> %s\n", id_text(touch.id).c_str(),
+                r.stamp_s, r.property.c_str(), r.value, touch.surface_m.x(), touch.surface_m.y(), touch.surface_m.z(),
+                touch.region.voxels(), model_name(r.model), touch.undone ? ", undone" : "", text(touch.before).c_str(),
+                text(touch.after).c_str());
+  }
+  if (map.touches.touches.empty()) std::printf("no touches\n");
+  return kDone;
+}
+
 TouchRequest request_of(const TouchOptions& options) {
   TouchRequest request;
   request.stamp_s = options.stamp_s;
@@ -88,6 +121,7 @@ TouchRequest request_of(const TouchOptions& options) {
 }
 
 int run_touch(const TouchOptions& options) {
+  if (options.list) return list_touches(options);
   const TouchRequest request = request_of(options);
   Map map = load_map(options.map);
   use_properties(map, options.properties);
@@ -136,6 +170,7 @@ void add_touch(CLI::App& app) {
                   {"touch", "Record a reading of a property at a point and update the surface it speaks for",
                    "feltmap touch map.vdb --at 0.4,1.2,0.0 --property friction --value 0.139\n"
                    "feltmap touch map.vdb --file touches.csv --out touched.vdb\n"
+                   "feltmap touch map.vdb --list\n"
                    "feltmap touch map.vdb --undo 3f0c5d8a91e2b764"},
                   *options, [options] { return run_touch(*options); });
   command.add_option("map", options->map, "Map file")->required();
@@ -145,6 +180,7 @@ void add_touch(CLI::App& app) {
   what.add_option("--file", options->file, "Recorded touches (CSV): all of them, or none");
   what.add_option("--undo", options->undo, "Take back the touch with this id");
   what.add_option("--redo", options->redo, "Let an undone touch count again");
+  what.add_flag("--list", options->list, "Show the journal: every touch with what was believed before and after");
   CLI::Option* property = command.add_option("--property", options->property, "What was measured");
   CLI::Option* value = command.add_option("--value", options->value, "The reading, in the property's unit");
   at->needs(property)->needs(value);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "core/error.h"
 #include "io/text_input.h"
@@ -76,10 +77,18 @@ void read_yaml_class(const YAML::Node& row, const fs::path& path, Table& table) 
       table.problems.push_back(
           describe_mismatch(where, "ignore", "true or false", "'" + scalar_text(row["ignore"]) + "'"));
   }
+  if (row["prior"]) {
+    const auto prior = parse_number(scalar_text(row["prior"]));
+    if (prior && *prior > 0 && std::isfinite(*prior))
+      info.prior = *prior;
+    else
+      table.problems.push_back(
+          describe_mismatch(where, "prior", "a number above 0", "'" + scalar_text(row["prior"]) + "'"));
+  }
   for (const auto& entry : row) {
     const std::string key = scalar_text(entry.first);
-    if (key != "id" && key != "name" && key != "color" && key != "ignore")
-      table.problems.push_back(describe_mismatch(where, "key", "id, name, color or ignore", "'" + key + "'"));
+    if (key != "id" && key != "name" && key != "color" && key != "ignore" && key != "prior")
+      table.problems.push_back(describe_mismatch(where, "key", "id, name, color, ignore or prior", "'" + key + "'"));
   }
   // A class whose id is unreadable would also be reported as a duplicate of class 0.
   if (id && !info.name.empty()) table.classes.push_back(info);

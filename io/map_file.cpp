@@ -36,6 +36,11 @@ Block& block_of_leaf(Map& map, const BlockCoord& coord, const std::string& grid,
   return map.store[number];
 }
 
+uint16_t u16_of(int32_t value, const std::string& where, const std::string& grid, const BlockCoord& coord) {
+  if (value < 0 || value > 0xffff) fail_leaf(where, grid, coord, "0 to 65535", std::to_string(value));
+  return uint16_t(value);
+}
+
 void require_leaves(size_t found, size_t expected, const std::string& grid, const std::string& where) {
   if (found != expected)
     throw FormatError(describe_mismatch(where + ": grid '" + grid + "'", "leaves",
@@ -64,11 +69,7 @@ void load_color(const VdbReader& file, const std::string& where, Map& map) {
   size_t colored = 0, leaves = 0;
   file.read<int32_t>("color_count", [&](const VdbLeaf<int32_t>& leaf) {
     ColorPlanes& planes = map.store.add_color(block_of_leaf(map, leaf.coord, "color_count", where));
-    for (int i = 0; i < kBlockVoxels; ++i) {
-      const int32_t n = leaf.values[i];
-      if (n < 0 || n > 0xffff) fail_leaf(where, "color_count", leaf.coord, "0 to 65535", std::to_string(n));
-      planes.count[i] = uint16_t(n);
-    }
+    for (int i = 0; i < kBlockVoxels; ++i) planes.count[i] = u16_of(leaf.values[i], where, "color_count", leaf.coord);
     ++colored;
   });
   file.read<openvdb::Vec3s>("color", [&](const VdbLeaf<openvdb::Vec3s>& leaf) {
@@ -100,6 +101,31 @@ void load_evidence(const VdbReader& file, const std::string& where, Map& map) {
   }
 }
 
+void load_even_evidence(const VdbReader& file, const std::string& where, Map& map) {
+  file.read<float>("evidence_even", [&](const VdbLeaf<float>& leaf) {
+    Block& block = block_of_leaf(map, leaf.coord, "evidence_even", where);
+    block.even_evidence = map.store.new_plane();
+    std::copy_n(leaf.values, kBlockVoxels, block.even_evidence->value);
+  });
+}
+
+void load_instances(const VdbReader& file, const std::string& where, Map& map) {
+  size_t instances = 0, leaves = 0;
+  const auto load = [&](const char* name, uint16_t(InstancePlanes::*plane)[kBlockVoxels], size_t& count) {
+    file.read<int32_t>(name, [&](const VdbLeaf<int32_t>& leaf) {
+      Block& block = block_of_leaf(map, leaf.coord, name, where);
+      if (&count == &leaves && block.instance == nullptr)
+        fail_leaf(where, name, leaf.coord, "a leaf of 'instance' there", "none");
+      InstancePlanes& planes = map.store.add_instance(block);
+      for (int i = 0; i < kBlockVoxels; ++i) (planes.*plane)[i] = u16_of(leaf.values[i], where, name, leaf.coord);
+      ++count;
+    });
+  };
+  load("instance", &InstancePlanes::id, instances);
+  load("instance_votes", &InstancePlanes::votes, leaves);
+  require_leaves(leaves, instances, "instance_votes", where);
+}
+
 Map read_map(const fs::path& path, uint64_t bytes) {
   const std::string where = path.string();
   const OpenedFile opened(path);
@@ -112,6 +138,8 @@ Map read_map(const fs::path& path, uint64_t bytes) {
   load_geometry(file, where, map);
   if (file.has("color_count")) load_color(file, where, map);
   load_evidence(file, where, map);
+  if (file.has("evidence_even")) load_even_evidence(file, where, map);
+  if (file.has("instance")) load_instances(file, where, map);
   map.properties = std::move(header.properties);
   map.touches = std::move(header.touches);
   for (Touch& touch : map.touches.touches) {

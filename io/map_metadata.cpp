@@ -29,9 +29,11 @@ const std::string kTextPrefix = "text/";
 
 json classes_to_json(const ClassTable& table) {
   json rows = json::array();
-  for (const ClassInfo& c : table.classes())
+  for (const ClassInfo& c : table.classes()) {
     rows.push_back(
         {{"id", c.id}, {"name", c.name}, {"color", {c.color.r, c.color.g, c.color.b}}, {"ignore", c.ignore}});
+    if (c.prior != 1) rows.back()["prior"] = c.prior;
+  }
   return rows;
 }
 
@@ -42,7 +44,8 @@ ClassTable classes_from_json(const json& rows) {
     classes.push_back({row.at("id").get<uint16_t>(),
                        row.at("name").get<std::string>(),
                        {color.at(0).get<uint8_t>(), color.at(1).get<uint8_t>(), color.at(2).get<uint8_t>()},
-                       row.at("ignore").get<bool>()});
+                       row.at("ignore").get<bool>(),
+                       row.value("prior", 1.0)});
   }
   return classes.empty() ? ClassTable() : ClassTable(std::move(classes));
 }

@@ -50,8 +50,9 @@ struct SequenceOptions {
   std::optional<DepthEncoding> depth_encoding{};
   std::optional<bool> depth_is_ray_length{};  ///< depth along the pixel's ray instead of along the optical axis
   std::optional<PoseConvention> pose_convention{};
-  double max_dt_s = 0.02;  ///< largest difference of stamps within one frame
-  bool read_color = true;  ///< false: colour is not decoded, and frames without it are whole
+  double max_dt_s = 0.02;      ///< largest difference of stamps within one frame
+  bool read_color = true;      ///< false: colour is not decoded, and frames without it are whole
+  bool read_instances = true;  ///< false: instance images are not decoded
 };
 
 }  // namespace felt

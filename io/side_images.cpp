@@ -35,7 +35,10 @@ NamedImages images_in(const fs::path& folder) {
   return images;
 }
 
-void attach(const fs::path& folder, SequenceListing& listing, ImageSource FrameRecord::*member, const char* what) {
+}  // namespace
+
+void attach_images(const fs::path& folder, SequenceListing& listing, ImageSource FrameRecord::*member,
+                   const char* what) {
   const NamedImages images = images_in(folder);
   bool any = false;
   for (FrameRecord& frame : listing.frames) {
@@ -55,14 +58,8 @@ void attach(const fs::path& folder, SequenceListing& listing, ImageSource FrameR
                           std::to_string(images.by_stem.size()) + " PNG images, none of them of a frame"));
 }
 
-}  // namespace
-
 void attach_labels(const fs::path& folder, SequenceListing& listing) {
-  attach(folder, listing, &FrameRecord::labels, "labels");
-}
-
-void attach_probabilities(const fs::path& folder, SequenceListing& listing) {
-  attach(folder, listing, &FrameRecord::probabilities, "probabilities");
+  attach_images(folder, listing, &FrameRecord::labels, "labels");
 }
 
 }  // namespace felt

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/frame.h"
+#include "io/reader.h"
 #include "mapping/touch_update.h"
 
 namespace felt {
@@ -31,11 +31,16 @@ std::vector<RecordedTouch> parse_touches(const std::string& text, const std::str
 
 /// The sequence that touches were recorded with.
 struct TouchedSequence {
-  double first_stamp_s = 0, last_stamp_s = 0;
-  int64_t first_frame = 0, last_frame = 0;
-  /// The frame with this number, or the one nearest to a stamp; nothing where it cannot be read.
-  std::function<std::optional<Frame>(const RecordedTouch&)> frame_of;
+  std::vector<FrameName> frames;  ///< every recorded frame; not empty
+  /// The frame at a place of `frames`; nothing where it cannot be read.
+  std::function<std::optional<Frame>(size_t)> read;
 };
+/// `reader` must outlive what is returned.
+TouchedSequence touched_sequence(const SequenceReader& reader);
+
+/// When a touch was recorded, seconds: its stamp, or that of its frame. Throws TouchError where it is not within the
+/// sequence.
+double stamp_of(const RecordedTouch& touch, const TouchedSequence& sequence);
 
 /// What became of one recorded touch.
 struct TouchOutcome {

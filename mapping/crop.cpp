@@ -37,11 +37,18 @@ void copy_observed(const Block& from, const BlockMask& inside, BlockStore& store
       color.count[i] = from.color->count[i];
     }
   }
-  for (const EvidencePlane& evidence : from.evidence) {
-    Plane* counts = store.new_plane();
+  const auto copied = [&](const Plane& plane) {
+    Plane* copy = store.new_plane();
     for (int i = 0; i < kBlockVoxels; ++i)
-      if (inside.test(i)) counts->value[i] = evidence.counts->value[i];
-    to.evidence.push_back({evidence.slot, counts});
+      if (inside.test(i)) copy->value[i] = plane.value[i];
+    return copy;
+  };
+  for (const EvidencePlane& evidence : from.evidence) to.evidence.push_back({evidence.slot, copied(*evidence.counts)});
+  if (from.even_evidence != nullptr) to.even_evidence = copied(*from.even_evidence);
+  if (from.instance != nullptr) {
+    InstancePlanes& instance = store.add_instance(to);
+    for (int i = 0; i < kBlockVoxels; ++i)
+      if (inside.test(i)) instance.id[i] = from.instance->id[i], instance.votes[i] = from.instance->votes[i];
   }
 }
 
@@ -52,8 +59,8 @@ Region voxels_in(const Map& map, const Eigen::AlignedBox3d& box_m) {
 }
 
 Region voxels_of_class(const Map& map, int slot) {
-  return observed_voxels(
-      map, [&](const Block& block, int i) { return class_belief(block, i, map.classes.size()).slot == slot; });
+  return observed_voxels(map,
+                         [&](const Block& block, int i) { return class_belief(block, i, map.classes).slot == slot; });
 }
 
 Map cropped(const Map& map, const Region& region) {

@@ -82,7 +82,8 @@ std::vector<std::string> different_settings(const Map& a, const Map& b) {
 
 struct Channels {
   Accumulator tsdf{"tsdf", "m"}, weight{"weight", ""}, color{"color", "grey levels"},
-      color_count{"color_count", "observations"};
+      color_count{"color_count", "observations"}, even_evidence{"evidence_even", "counts"},
+      instance{"instance", "ids that differ"};
   struct Evidence {
     std::optional<int> slot_a, slot_b;
     Accumulator sums;
@@ -142,13 +143,25 @@ void compare_color(const Block* a, const Block* b, Channels& channels) {
   }
 }
 
-void compare_evidence(const Block* a, const Block* b, Channels::Evidence& channel) {
-  const Plane* ea = evidence_of(a, channel.slot_a);
-  const Plane* eb = evidence_of(b, channel.slot_b);
-  if (ea == nullptr && eb == nullptr) return;
+void compare_planes(const Plane* a, const Plane* b, Accumulator& channel) {
+  if (a == nullptr && b == nullptr) return;
   for (int i = 0; i < kBlockVoxels; ++i) {
-    const float va = ea != nullptr ? ea->value[i] : 0, vb = eb != nullptr ? eb->value[i] : 0;
-    channel.sums.add(va != 0, vb != 0, va, vb);
+    const float va = a != nullptr ? a->value[i] : 0, vb = b != nullptr ? b->value[i] : 0;
+    channel.add(va != 0, vb != 0, va, vb);
+  }
+}
+
+void compare_evidence(const Block* a, const Block* b, Channels::Evidence& channel) {
+  compare_planes(evidence_of(a, channel.slot_a), evidence_of(b, channel.slot_b), channel.sums);
+}
+
+void compare_instances(const Block* a, const Block* b, Accumulator& channel) {
+  const InstancePlanes* pa = a != nullptr ? a->instance : nullptr;
+  const InstancePlanes* pb = b != nullptr ? b->instance : nullptr;
+  if (pa == nullptr && pb == nullptr) return;
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    const int ia = pa != nullptr ? pa->id[i] : 0, ib = pb != nullptr ? pb->id[i] : 0;
+    channel.add(ia != 0, ib != 0, ia != ib, 0);
   }
 }
 
@@ -221,12 +234,20 @@ MapDifference difference(const Map& a, const Map& b) {
     compare_geometry(in_a, in_b, channels);
     compare_color(in_a, in_b, channels);
     for (Channels::Evidence& channel : channels.evidence) compare_evidence(in_a, in_b, channel);
+    compare_planes(in_a != nullptr ? in_a->even_evidence : nullptr, in_b != nullptr ? in_b->even_evidence : nullptr,
+                   channels.even_evidence);
+    compare_instances(in_a, in_b, channels.instance);
     for (Channels::Touched& channel : channels.touched) compare_touched(in_a, in_b, channel);
     result.class_flips += flips(a, b, in_a, in_b);
   }
   for (Accumulator* sums : {&channels.tsdf, &channels.weight, &channels.color, &channels.color_count})
     result.channels.push_back(sums->finish());
   for (Channels::Evidence& channel : channels.evidence) result.channels.push_back(channel.sums.finish());
+  // Most maps have neither: then there is nothing to say.
+  for (Accumulator* sums : {&channels.even_evidence, &channels.instance})
+    if (const ChannelDifference channel = sums->finish();
+        channel.voxels_both + channel.voxels_only_a + channel.voxels_only_b > 0)
+      result.channels.push_back(channel);
   for (Channels::Touched& channel : channels.touched)
     for (Accumulator* sums : {&channel.n, &channel.mean, &channel.m2}) result.channels.push_back(sums->finish());
   compare_journals(a.touches, b.touches, result);

@@ -53,6 +53,22 @@ void verify_color(const Block& block, Faults& faults) {
   }
 }
 
+void verify_counts(const Plane& counts, const std::string& name, const Block& block, Faults& faults) {
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    const float e = counts.value[i];
+    if (!std::isfinite(e) || e < 0) faults.add(name, "evidence is finite and >= 0", block.coord, i);
+    if (e != 0 && !(block.geometry->weight[i] > 0))
+      faults.add(name, "evidence only where the surface was observed", block.coord, i);
+  }
+}
+
+void verify_instances(const Block& block, Faults& faults) {
+  if (block.instance == nullptr) return;
+  for (int i = 0; i < kBlockVoxels; ++i)
+    if (block.instance->id[i] == 0 && block.instance->votes[i] != 0)
+      faults.add("instance", "votes only where there is an instance", block.coord, i);
+}
+
 void verify_evidence(const Map& map, const Block& block, Faults& faults) {
   int before = -1;
   for (const EvidencePlane& plane : block.evidence) {
@@ -63,13 +79,9 @@ void verify_evidence(const Map& map, const Block& block, Faults& faults) {
     const std::string name = "evidence/" + map.classes.at_slot(plane.slot).name;
     if (plane.slot <= before) faults.add(name, "planes in ascending order of classes", block.coord, 0);
     before = plane.slot;
-    for (int i = 0; i < kBlockVoxels; ++i) {
-      const float e = plane.counts->value[i];
-      if (!std::isfinite(e) || e < 0) faults.add(name, "evidence is finite and >= 0", block.coord, i);
-      if (e != 0 && !(block.geometry->weight[i] > 0))
-        faults.add(name, "evidence only where the surface was observed", block.coord, i);
-    }
+    verify_counts(*plane.counts, name, block, faults);
   }
+  if (block.even_evidence != nullptr) verify_counts(*block.even_evidence, "evidence_even", block, faults);
 }
 
 void verify_touch_planes(const Map& map, const Block& block, Faults& faults) {
@@ -136,6 +148,7 @@ std::vector<MapFault> verify(const Map& map) {
     verify_geometry(block, float(map.truncation_m), faults);
     verify_color(block, faults);
     verify_evidence(map, block, faults);
+    verify_instances(block, faults);
     verify_touch_planes(map, block, faults);
   }
   verify_regions(map, faults);

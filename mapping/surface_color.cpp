@@ -1,13 +1,15 @@
 #include "mapping/surface_color.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "core/error.h"
-#include "inference/student_t.h"
-#include "mapping/class_belief.h"
-#include "mapping/touch_state.h"
+#include "mapping/property_view.h"
+#include "mapping/touch_view.h"
 
 namespace felt {
 namespace {
@@ -20,44 +22,26 @@ struct Known {
   float value = kNan;  ///< of the ramp
 };
 
-float entropy_of(const std::vector<double>& probability) {
-  double sum = 0;
-  for (const double p : probability)
-    if (p > 0) sum -= p * std::log(p);
-  return float(sum);
-}
-
-/// Asks the map voxel by voxel. Touches make a difference where they reach; elsewhere vision alone is quicker to ask.
+/// What a colour shows of a voxel.
 class SurfaceBeliefs {
 public:
-  SurfaceBeliefs(const Map& map, const SurfaceColor& color) : map_(map), color_(color), beliefs_(map) {}
+  SurfaceBeliefs(const Map& map, const SurfaceColor& color)
+      : map_(map), color_(color), touched_(std::make_shared<const std::vector<TouchView>>(touch_views(map))) {
+    if (color.property >= 0) property_.emplace(map, color.property, touched_);
+  }
 
-  Known at(const Index3& voxel) {
-    const Block* block = map_.store.get(block_of_voxel(voxel));
-    if (block == nullptr) return {};
-    const ClassBelief vision = class_belief(*block, offset_in_block(voxel), map_.classes.size());
-    const bool touched = map_.touches.any_active() && !covering_touches(map_, voxel).empty();
-    if (vision.slot == ClassTable::kNoSlot && !touched) return {};
-    const bool property = color_.property >= 0;
-    if (!touched && !property) return {vision.slot, vision.entropy};
-    const Belief belief = beliefs_.at(voxel);
-    const std::vector<double>& p = belief.class_probability;
-    Known known{uint16_t(std::max_element(p.begin(), p.end()) - p.begin()), entropy_of(p)};
-    if (property) known.value = number(belief.next_reading[size_t(color_.property)]);
-    return known;
+  Known at(const Index3& voxel) const {
+    const ClassBelief belief = class_belief_at(map_, *touched_, voxel);
+    if (!property_) return {belief.slot, belief.slot == ClassTable::kNoSlot ? kNan : belief.entropy};
+    const PropertyEstimate estimate = property_->at(voxel);
+    return {belief.slot, color_.source == SurfaceColor::Source::mean ? estimate.mean : estimate.sd};
   }
 
 private:
-  float number(const StudentTMixture& reading) const {
-    if (reading.weight.empty()) return kNan;
-    if (color_.source == SurfaceColor::Source::mean) return float(mean(reading).value_or(double(kNan)));
-    const std::optional<double> v = variance(reading);
-    return v ? float(std::sqrt(*v)) : kNan;
-  }
-
   const Map& map_;
   const SurfaceColor& color_;
-  Beliefs beliefs_;
+  TouchViews touched_;
+  std::optional<PropertyView> property_;
 };
 
 constexpr Rgba8 kNothingKnown{128, 128, 128, 255};
@@ -110,9 +94,9 @@ std::optional<ColorRange> color_surface(const Map& map, const std::vector<Vertex
   using Source = SurfaceColor::Source;
   if (map.classes.empty()) return std::nullopt;
   std::vector<Known> known;
-  known.reserve(edges.size());
-  SurfaceBeliefs beliefs(map, color);
-  for (const VertexEdge& edge : edges) known.push_back(beliefs.at(nearest_voxel(edge)));
+  const SurfaceBeliefs beliefs(map, color);
+  known.resize(edges.size());
+  tbb::parallel_for(size_t(0), edges.size(), [&](size_t i) { known[i] = beliefs.at(nearest_voxel(edges[i])); });
   const auto seen = [](const Known& k) { return k.slot != ClassTable::kNoSlot; };
   mesh.labels.resize(known.size());
   for (size_t i = 0; i < known.size(); ++i) mesh.labels[i] = seen(known[i]) ? map.classes.at_slot(known[i].slot).id : 0;

@@ -82,7 +82,8 @@ std::vector<Region> segments(const Map& map, const RegionSettings& settings, siz
     if (block.evidence.empty()) continue;
     const BlockMask band = surface_band(block, band_m, float(settings.min_weight));
     for (int tries = 0; tries < kSeedsPerBlock; ++tries) {
-      const BlockMask left = band - done[block.coord];
+      // Beside a known segment lies its border: from there the same surface would be flooded again.
+      const BlockMask left = band - dilated_inside(done[block.coord]);
       if (!left.any()) break;
       int seed = -1;
       for_each_bit(left, [&](int i) {
