@@ -94,14 +94,18 @@ void try_checkpoint(const std::function<void()>& save, int64_t frames) {
 }
 
 /// Fuses what the record has not read yet.
-void fuse(const SequenceReader& sequence, const FrameSource& source, const ReconstructOptions& options,
-          const std::vector<uint16_t>& ignored_ids, const CommonOptions& common, const InterruptGuard& interrupt,
-          const std::function<void()>& save, Map& map, FusionRecord& record) {
+void fuse(const SequenceReader& sequence, const FrameSource& source, const PerceptionTimes& perception,
+          const ReconstructOptions& options, const std::vector<uint16_t>& ignored_ids, const CommonOptions& common,
+          const InterruptGuard& interrupt, const std::function<void()>& save, Map& map, FusionRecord& record) {
   ProgressBar progress("frames", sequence.size(), !common.quiet);
   DecodeAhead frames(sequence, {.threads = common.thread_count(), .first = record.read});
+  const auto decode_s = [&] { return frames.decode_s() - perception.network_s() - perception.vote_s(); };
   fuse_sequence(frames, source, options.fusion, ignored_ids, map, record,
                 [&](const FusionRecord& so_far) -> std::string {
-                  progress.update(so_far.read);
+                  progress.update(so_far.read, shares_text({{"network", perception.network_s()},
+                                                            {"vote", perception.vote_s()},
+                                                            {"decode", decode_s()},
+                                                            {"fuse", so_far.allocate_s + so_far.fuse_s}}));
                   if (interrupt.requested()) return "interrupted";
                   constexpr int64_t kMemoryCheckEvery = 32;
                   if (so_far.read % kMemoryCheckEvery == 0 && memory_runs_out(map)) return "out of memory";
@@ -110,7 +114,9 @@ void fuse(const SequenceReader& sequence, const FrameSource& source, const Recon
                     try_checkpoint(save, so_far.read);
                   return {};
                 });
-  record.decode_s = frames.decode_s();
+  record.network_s = perception.network_s();
+  record.vote_s = perception.vote_s();
+  record.decode_s = decode_s();
   record.wait_s = frames.wait_s();
 }
 
@@ -154,6 +160,13 @@ void print_summary(const ReconstructReport& report, const fs::path& folder) {
   std::printf("%lld of %lld frames fused in %.2f s: %zu blocks, %zu voxels; mesh of %zu triangles\n",
               static_cast<long long>(fusion.fused), static_cast<long long>(fusion.read), report.total_s, report.blocks,
               report.active_voxels, report.mesh_triangles);
+  if (fusion.network_s + fusion.vote_s > 0)
+    std::printf("  thread time: %s\n", shares_text({{"network", fusion.network_s},
+                                                    {"vote", fusion.vote_s},
+                                                    {"decode", fusion.decode_s},
+                                                    {"fuse", fusion.allocate_s + fusion.fuse_s},
+                                                    {"mesh and save", report.mesh_s + report.save_s}})
+                                           .c_str());
   for (const auto& [reason, count] : fusion.skipped)
     std::printf("  skipped %lld: %s\n", static_cast<long long>(count), reason.c_str());
   if (!fusion.unknown_ids.empty()) {
@@ -172,11 +185,13 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   ReconstructOptions options = resolve(arguments, common.threads);
   common.threads = options.threads;
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(common.thread_count()));
-  const auto sequence = open_sequence(options.sequence, options.reading);
-  const PreparedClasses classes = prepare_classes(options.labels, sequence->info().classes);
+  auto sequence = open_sequence(options.sequence, options.reading);
+  const Perception perception = perception_of(options.perception, sequence->info().classes);
+  const PreparedClasses classes = prepare_classes(options.labels, perception.classes(sequence->info()));
   const TouchPlan touches = plan_touches(options, *sequence, classes.table);
   prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite || options.resume);
   check_memory(*sequence, options);
+  sequence = perceived_sequence(std::move(sequence), perception);
 
   const nlohmann::ordered_json config = to_json(options);
   const FrameSource source{sequence->info().fingerprint, fusion_settings(config)};
@@ -197,7 +212,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
     save_checkpoint(map, report.fusion, complete, source.recording, config, options.out / kMapName);
   };
   const InterruptGuard interrupt;
-  fuse(*sequence, source, options, classes.ignored_ids, common, interrupt, save, map, report.fusion);
+  fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save, map, report.fusion);
   if (report.fusion.fused == 0 && report.fusion.stopped.empty())
     throw FormatError(describe_mismatch(options.sequence.string(), "frames", "at least one that can be fused",
                                         nothing_fused(report.fusion)));
@@ -253,6 +268,7 @@ void add_reconstruct(CLI::App& app) {
                                   {"reconstruct", "Fuse a recorded RGB-D sequence into a map, a mesh and a report",
                                    "feltmap reconstruct recording --out result --voxel-size 0.02\n"
                                    "feltmap reconstruct rgbd_dataset_freiburg1_rpy --out result --frames 0:200:2\n"
+                                   "feltmap reconstruct recording --out result --segmenter net.yaml\n"
                                    "feltmap reconstruct recording --out result --checkpoint 100 --resume"},
                                   *common, [arguments, common] { return run(*arguments, *common); });
   add_reconstruct_options(command, *arguments);

@@ -116,6 +116,7 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
       ->group(reading);
   add_label_options(command, a.label_settings);
   command.add_flag("--no-color", a.no_color, "Do not read colour images")->group(reading);
+  a.perception.add_to(command, "Perception", "--segmenter");
 }
 
 ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
@@ -154,6 +155,11 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
                     text_of(*reading.depth_scale));
   problems.expect(positive(reading.max_dt_s), "--max-dt", "seconds", "a number above 0", text_of(reading.max_dt_s));
 
+  options.perception = a.perception;
+  reading.instances_dir = a.perception.instances;
+  if (!a.perception.net.empty())
+    problems.expect(reading.read_color, "--segmenter", "colour", "colour images to look at", "--no-color");
+
   options.voxel_size_m = a.voxel_size_m.value_or(file.voxel_size_m.value_or(options.voxel_size_m));
   problems.expect(positive(options.voxel_size_m), "--voxel-size", "edge of a voxel in metres", "a number above 0",
                   text_of(options.voxel_size_m));
@@ -185,7 +191,7 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   options.labels = overlaid(a.label_settings, file.label_settings);
   for (const std::string& problem : problems_of(options.labels)) problems.add(problem);
   fusion.labels = label_config(options.labels);
-  reading.read_instances = fusion.labels.instances;
+  reading.read_instances = fusion.labels.instances || a.perception.vote == SegmentSource::instances;
   problems.throw_if_any();
   return options;
 }
@@ -212,6 +218,7 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   if (!options.touches.empty()) json["touches"] = options.touches.string();
   json["max_dt_s"] = reading.max_dt_s;
   json["color"] = reading.read_color;
+  if (options.perception.asked()) json["perception"] = to_json(options.perception);
   json["voxel_size_m"] = options.voxel_size_m;
   json["truncation_m"] = options.truncation_m;
   json["min_depth_m"] = short_decimal(fusion.min_depth_m);

@@ -5,6 +5,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "apps/perception_options.h"
 #include "io/label_settings.h"
 #include "io/sequence_options.h"
 #include "mapping/integration_config.h"
@@ -19,6 +20,7 @@ struct ReconstructOptions {
   double voxel_size_m = 0.02;
   double truncation_m = 0.08;
   IntegrationConfig fusion;
+  PerceptionArguments perception;
   LabelSettings labels;
   bool overwrite = false;
   int64_t checkpoint_every = 0;  ///< frames; 0: only at the end
@@ -33,6 +35,7 @@ struct ReconstructArguments {
   std::optional<double> depth_scale, max_dt_s, voxel_size_m, min_depth_m, max_depth_m, max_weight;
   std::optional<DistanceModel> distance;
   std::optional<WeightModel> weight;
+  PerceptionArguments perception;
   LabelSettings label_settings;
   bool ray_length = false, no_color = false, carve = false, overwrite = false, resume = false;
   int64_t checkpoint_every = 0;

@@ -16,6 +16,8 @@ struct FusionRecord {
   int64_t fused = 0;
   std::map<std::string, int64_t> skipped;  ///< by reason
   double decode_s = 0;                     ///< summed over decoding threads
+  double network_s = 0;                    ///< the same, in the segmenter
+  double vote_s = 0;                       ///< the same, in segments and voting
   double wait_s = 0;                       ///< that fusion waited for a decoded frame
   double allocate_s = 0, fuse_s = 0;
   std::vector<double> frame_ms;              ///< of each fused frame: allocation and update of all channels

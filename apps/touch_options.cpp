@@ -77,8 +77,9 @@ Eigen::Vector3d point_of(const std::string& text) {
 }
 
 void RegionOptions::add_to(CLI::App& command) {
-  command.add_option("--region", rule, "connected, mask, sphere, or instance: the thing touched")
-      ->check(CLI::IsMember({"connected", "mask", "sphere"}))
+  command
+      .add_option("--region", rule, "connected, mask, sphere, instance: the thing touched, or segment of the whole map")
+      ->check(CLI::IsMember({"connected", "mask", "sphere", "instance", "segment"}))
       ->capture_default_str();
   command.add_option("--radius", settings.radius_m, "Limit in metres: along the surface, or of the sphere");
   command.add_option("--snap", settings.snap_voxels, "How far the surface may be from the point, voxels")

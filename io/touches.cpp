@@ -130,8 +130,15 @@ size_t place_of(const RecordedTouch& touch, const TouchedSequence& sequence) {
   return size_t(nearest - frames.begin());
 }
 
-TouchRequest request_of(const RecordedTouch& touch, const TouchRequest& defaults, const TouchedSequence* sequence) {
-  TouchRequest request = defaults;
+/// What a recorded touch asks of the map.
+struct Resolved {
+  TouchRequest request;
+  std::optional<ViewMask> view;  ///< for the rule `mask`
+};
+
+Resolved resolved(const RecordedTouch& touch, const TouchRequest& defaults, const TouchedSequence* sequence) {
+  Resolved out{defaults, std::nullopt};
+  TouchRequest& request = out.request;
   request.property = touch.property;
   request.value = touch.value;
   request.sigma = touch.sigma;
@@ -139,14 +146,15 @@ TouchRequest request_of(const RecordedTouch& touch, const TouchRequest& defaults
   if (sequence == nullptr) {
     request.stamp_s = touch.stamp_s ? *touch.stamp_s : double(*touch.frame);
     if (!touch.point_m) throw TouchError("touch: expected a world point x, y, z, found a pixel without its sequence");
-    return request;
+    return out;
   }
   request.stamp_s = stamp_of(touch, *sequence);
-  if (touch.point_m) return request;
+  if (touch.point_m) return out;
   const std::optional<Frame> frame = sequence->read(place_of(touch, *sequence));
   if (!frame) throw TouchError("touch: expected a readable frame at its stamp, found none");
   request.point_m = point_under(*frame, *touch.pixel);
-  return request;
+  if (request.region.rule == RegionRule::mask) out.view = segment_mask(*frame, *touch.pixel, sequence->segments);
+  return out;
 }
 
 }  // namespace
@@ -209,7 +217,8 @@ std::vector<TouchOutcome> apply_recorded_touches(Map& map, const std::vector<Rec
   for (const RecordedTouch& touch : touches) {
     TouchOutcome outcome{touch, std::nullopt, ""};
     try {
-      outcome.effect = apply_touch(map, resolve_touch(map, request_of(touch, defaults, sequence)));
+      const Resolved asked = resolved(touch, defaults, sequence);
+      outcome.effect = apply_touch(map, resolve_touch(map, asked.request, asked.view ? &*asked.view : nullptr));
     } catch (const Error& error) {
       outcome.refused = error.what();
     }

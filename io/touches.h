@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "io/reader.h"
+#include "io/segmentation/segment_source.h"
 #include "mapping/touch_update.h"
 
 namespace felt {
@@ -34,6 +35,8 @@ struct TouchedSequence {
   std::vector<FrameName> frames;  ///< every recorded frame; not empty
   /// The frame at a place of `frames`; nothing where it cannot be read.
   std::function<std::optional<Frame>(size_t)> read;
+  /// What the region rule `mask` takes a touch's region from, where it is given by frame and pixel.
+  SegmentSource segments = SegmentSource::geometric;
 };
 /// `reader` must outlive what is returned.
 TouchedSequence touched_sequence(const SequenceReader& reader);
@@ -52,7 +55,8 @@ struct TouchOutcome {
 /// Applies recorded touches to a map at their stamps. Touch state is a function of vision counts and journal, so they
 /// are all applied when the frames are fused: each region is then found in the complete map, and it makes no difference
 /// when in the sequence a touch came. `defaults` gives what a row does not say (model, region settings, ...); without a
-/// `sequence` a row needs a point, and a frame number stands for its stamp. A touch that cannot be applied leaves the
+/// `sequence` a row needs a point, and a frame number stands for its stamp. With the region rule `mask` the region of a
+/// touch given by frame and pixel is the frame's segment under that pixel. A touch that cannot be applied leaves the
 /// map as it was and says why; the others count.
 std::vector<TouchOutcome> apply_recorded_touches(Map& map, const std::vector<RecordedTouch>& touches,
                                                  const TouchRequest& defaults, const TouchedSequence* sequence);

@@ -10,6 +10,7 @@
 #include <numbers>
 #include <queue>
 
+#include "mapping/map_segments.h"
 #include "mapping/region_surface.h"
 
 namespace felt {
@@ -245,6 +246,30 @@ int contact_class(const Map& map, const Index3& centre, const SurfaceRule& band)
   return *best > 0 ? int(best - sum.begin()) : -1;
 }
 
+/// The thing that most of these voxels belong to, the lowest id of equals. Throws TouchError where there is none.
+uint16_t contact_instance(const Map& map, const Index3& centre, const SurfaceRule& band) {
+  std::map<uint16_t, int> voxels;
+  for_each_near(map, centre, band, [&](const Block& block, int i) {
+    if (block.instance != nullptr && block.instance->votes[i] > 0) ++voxels[block.instance->id[i]];
+  });
+  voxels.erase(0);
+  const auto most =
+      std::max_element(voxels.begin(), voxels.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (most != voxels.end()) return most->first;
+  const bool any = std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
+                               [](const Block& b) { return b.instance != nullptr; });
+  throw TouchError(describe_mismatch("region instance", "contact",
+                                     any ? "a surface that belongs to a thing" : "a map with instance ids",
+                                     any ? "one without an instance id" : "none (reconstruct --instances)"));
+}
+
+/// The contact's segment of the map, cut to `within`.
+Region segment_around(const Map& map, const Contact& contact, const RegionSettings& settings, const Region& within) {
+  for (const Region& segment : map_segments(map, map_segment_settings(settings)))
+    if (segment.contains(contact.voxel)) return intersected(segment, within);
+  throw TouchError("region segment: contact: expected a surface that is part of a segment, found a piece too small");
+}
+
 /// Says what is at a point that is too far from every surface.
 [[noreturn]] void fail_to_snap(const Map& map, const Eigen::Vector3d& p, const std::string& where, double radius_m) {
   const std::string expected = "observed surface within " + metres(radius_m);
@@ -318,8 +343,14 @@ Region find_region(const Map& map, const Contact& contact, const RegionSettings&
   rule.centre = contact.voxel;
   rule.radius_voxels = float(settings.radius_m / map.voxel_size_m);
   if (settings.rule == RegionRule::sphere) return surface_blocks(map, rule);
+  if (settings.rule == RegionRule::instance) {
+    rule.instance = contact_instance(map, contact.voxel, rule);
+    return surface_blocks(map, rule);
+  }
+  if (settings.rule == RegionRule::segment) return segment_around(map, contact, settings, surface_blocks(map, rule));
   if (settings.rule != RegionRule::connected)
-    throw TouchError(describe_mismatch("region", "rule", "connected or sphere", rule_name(settings.rule)));
+    throw TouchError(
+        describe_mismatch("region", "rule", "connected, sphere, instance or segment", rule_name(settings.rule)));
   rule.slot = contact.slot;
   rule.class_ratio = float(settings.class_ratio);
   rule.cos_normal_change = float(std::cos(settings.normal_change_deg * std::numbers::pi / 180));
