@@ -16,7 +16,29 @@ using nlohmann::json;
 constexpr const char* kConfig = "config";
 constexpr const char* kProgress = "progress";
 
-json progress_of(const FusionRecord& record, bool complete, const std::string& recording) {
+/// Twelve numbers a pose, row by row: JSON keeps every bit of them.
+json poses_json(const std::vector<Eigen::Isometry3d>& poses) {
+  json rows = json::array();
+  for (const Eigen::Isometry3d& pose : poses) {
+    json row = json::array();
+    for (int i = 0; i < 12; ++i) row.push_back(pose.matrix()(i / 4, i % 4));
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+std::vector<Eigen::Isometry3d> poses_of(const json& rows) {
+  std::vector<Eigen::Isometry3d> poses;
+  for (const json& row : rows) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    for (int i = 0; i < 12; ++i) pose.matrix()(i / 4, i % 4) = row.at(size_t(i)).get<double>();
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+json progress_of(const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints, bool complete,
+                 const std::string& recording) {
   json unknown = json::array();
   for (const auto& [id, pixels] : record.unknown_ids) unknown.push_back({id, pixels});
   return {{"recording", recording},
@@ -26,7 +48,8 @@ json progress_of(const FusionRecord& record, bool complete, const std::string& r
           {"skipped", record.skipped},
           {"label_voxels", {record.labels.voxels, record.labels.unknown, record.labels.invalid}},
           {"unknown_ids", unknown},
-          {"ignored_pixels", record.ignored_pixels}};
+          {"ignored_pixels", record.ignored_pixels},
+          {"viewpoints", poses_json(viewpoints)}};
 }
 
 json text_of(const Map& map, const char* key, const std::string& where) {
@@ -39,9 +62,9 @@ json text_of(const Map& map, const char* key, const std::string& where) {
   return text;
 }
 
-FusionRecord record_of(const json& progress, const std::string& where) {
+void read_progress(const json& progress, const std::string& where, Checkpoint& checkpoint) {
   try {
-    FusionRecord record;
+    FusionRecord& record = checkpoint.record;
     progress.at("read").get_to(record.read);
     progress.at("fused").get_to(record.fused);
     progress.at("skipped").get_to(record.skipped);
@@ -50,7 +73,8 @@ FusionRecord record_of(const json& progress, const std::string& where) {
     for (const json& row : progress.at("unknown_ids"))
       record.unknown_ids[row.at(0).get<uint16_t>()] = row.at(1).get<uint64_t>();
     progress.at("ignored_pixels").get_to(record.ignored_pixels);
-    return record;
+    checkpoint.viewpoints = poses_of(progress.at("viewpoints"));
+    progress.at("complete").get_to(checkpoint.complete);
   } catch (const json::exception& fault) {
     throw FormatError(describe_mismatch(where, "text 'progress'", "what reconstruct counts", fault.what()));
   }
@@ -78,11 +102,13 @@ std::string fusion_settings(const nlohmann::ordered_json& config) {
   return shaping.dump();
 }
 
-void save_checkpoint(Map& map, const FusionRecord& record, bool complete, const std::string& recording,
-                     const nlohmann::ordered_json& config, const std::filesystem::path& path) {
+void save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
+                     bool complete, const std::string& recording, const nlohmann::ordered_json& config,
+                     const std::filesystem::path& path) {
   map.metadata[kConfig] = config.dump();
-  map.metadata[kProgress] = progress_of(record, complete, recording).dump();
-  save_map(map, path);
+  map.metadata[kProgress] = progress_of(record, viewpoints, complete, recording).dump();
+  // On the way nobody looks at views, and they take longer than the rest.
+  save_map(map, path, {.views = complete || !record.stopped.empty()});
 }
 
 std::optional<Checkpoint> resume(const std::filesystem::path& path, const std::string& recording,
@@ -94,9 +120,9 @@ std::optional<Checkpoint> resume(const std::filesystem::path& path, const std::s
   if (progress.value("recording", json()) != recording)
     throw ConfigError(describe_mismatch("--resume", "recording", "the one that " + where + " was made of", "another"));
   require_same_run(text_of(map, kConfig, where), json(config), where);
-  FusionRecord record = record_of(progress, where);
-  const bool complete = progress.value("complete", json()) == true;
-  return Checkpoint{std::move(map), std::move(record), complete};
+  Checkpoint checkpoint{std::move(map), {}, {}, false};
+  read_progress(progress, where, checkpoint);
+  return checkpoint;
 }
 
 }  // namespace felt::apps

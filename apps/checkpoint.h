@@ -1,9 +1,11 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "apps/reconstruct_report.h"
 #include "mapping/map.h"
@@ -18,15 +20,18 @@ namespace felt::apps {
 /// the selection of frames are left out, so that parts of one recording have the same.
 std::string fusion_settings(const nlohmann::ordered_json& config);
 
-/// Writes the map with all that `resume` needs. `recording`: SequenceInfo::fingerprint. `config`: settings as used.
-/// `complete`: nothing is left to do for this map but to mesh it; its recorded touches are in it.
-void save_checkpoint(Map& map, const FusionRecord& record, bool complete, const std::string& recording,
-                     const nlohmann::ordered_json& config, const std::filesystem::path& path);
+/// Writes the map with all that `resume` needs, and its views where the run ends. `recording`:
+/// SequenceInfo::fingerprint. `config`: settings as used. `viewpoints`: ViewNovelty::seen. `complete`: nothing is left
+/// to do for this map but to mesh it; its recorded touches are in it.
+void save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
+                     bool complete, const std::string& recording, const nlohmann::ordered_json& config,
+                     const std::filesystem::path& path);
 
 /// Where an earlier run ended.
 struct Checkpoint {
   Map map;
   FusionRecord record;  ///< what was counted; no times
+  std::vector<Eigen::Isometry3d> viewpoints;
   bool complete = false;
 };
 

@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include "mapping/ignored_classes.h"
-#include "mapping/tsdf_integrator.h"
 
 namespace felt::apps {
 
@@ -24,9 +23,8 @@ void count_unknown_ids(const Frame& frame, const ClassTable& classes, std::map<u
 }  // namespace
 
 void fuse_sequence(DecodeAhead& frames, const FrameSource& source, const IntegrationConfig& config,
-                   const std::vector<uint16_t>& ignored_ids, Map& map, FusionRecord& record,
-                   const std::function<std::string(const FusionRecord&)>& after_frame) {
-  IntegrationScratch scratch;
+                   const std::vector<uint16_t>& ignored_ids, Map& map, IntegrationScratch& scratch,
+                   FusionRecord& record, const std::function<std::string(const FusionRecord&)>& after_frame) {
   while (std::optional<ReadResult> next = frames.next()) {
     ++record.read;
     if (const auto* skipped = std::get_if<SkippedFrame>(&*next)) {

@@ -7,6 +7,7 @@
 #include "io/decode_ahead.h"
 #include "mapping/integration_config.h"
 #include "mapping/map.h"
+#include "mapping/tsdf_integrator.h"
 
 namespace felt::apps {
 
@@ -20,7 +21,7 @@ struct FrameSource {
 /// `record`. `after_frame` is called with the record after every frame, fused or skipped; a text that is not empty ends
 /// fusion there, with that reason: what was fused stays. Pixels of `ignored_ids` leave no trace.
 void fuse_sequence(DecodeAhead& frames, const FrameSource& source, const IntegrationConfig& config,
-                   const std::vector<uint16_t>& ignored_ids, Map& map, FusionRecord& record,
-                   const std::function<std::string(const FusionRecord&)>& after_frame);
+                   const std::vector<uint16_t>& ignored_ids, Map& map, IntegrationScratch& scratch,
+                   FusionRecord& record, const std::function<std::string(const FusionRecord&)>& after_frame);
 
 }  // namespace felt::apps

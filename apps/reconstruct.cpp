@@ -96,11 +96,12 @@ void try_checkpoint(const std::function<void()>& save, int64_t frames) {
 /// Fuses what the record has not read yet.
 void fuse(const SequenceReader& sequence, const FrameSource& source, const PerceptionTimes& perception,
           const ReconstructOptions& options, const std::vector<uint16_t>& ignored_ids, const CommonOptions& common,
-          const InterruptGuard& interrupt, const std::function<void()>& save, Map& map, FusionRecord& record) {
+          const InterruptGuard& interrupt, const std::function<void()>& save, Map& map, IntegrationScratch& scratch,
+          FusionRecord& record) {
   ProgressBar progress("frames", sequence.size(), !common.quiet);
   DecodeAhead frames(sequence, {.threads = common.thread_count(), .first = record.read});
   const auto decode_s = [&] { return frames.decode_s() - perception.network_s() - perception.vote_s(); };
-  fuse_sequence(frames, source, options.fusion, ignored_ids, map, record,
+  fuse_sequence(frames, source, options.fusion, ignored_ids, map, scratch, record,
                 [&](const FusionRecord& so_far) -> std::string {
                   progress.update(so_far.read, shares_text({{"network", perception.network_s()},
                                                             {"vote", perception.vote_s()},
@@ -200,19 +201,23 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   map.classes = classes.table;
   map.properties = touches.properties;
   options.fusion.labels.likelihood = classes.likelihood.get();
+  IntegrationScratch scratch;
   bool complete = false;
   if (options.resume)
     if (auto earlier = resume(options.out / kMapName, source.recording, config)) {
       map = std::move(earlier->map);
       report.fusion = std::move(earlier->record);
+      scratch.viewpoints.set_seen(std::move(earlier->viewpoints));
       report.resumed_after = report.fusion.read;
       complete = earlier->complete;
     }
   const auto save = [&] {
-    save_checkpoint(map, report.fusion, complete, source.recording, config, options.out / kMapName);
+    save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, source.recording, config,
+                    options.out / kMapName);
   };
   const InterruptGuard interrupt;
-  fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save, map, report.fusion);
+  fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save, map, scratch,
+       report.fusion);
   if (report.fusion.fused == 0 && report.fusion.stopped.empty())
     throw FormatError(describe_mismatch(options.sequence.string(), "frames", "at least one that can be fused",
                                         nothing_fused(report.fusion)));

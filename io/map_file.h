@@ -22,6 +22,7 @@ enum class MapCompression {
 
 struct SaveOptions {
   MapCompression compression = MapCompression::fast;
+  bool views = true;  ///< also what stock viewers show and loading does not need: labels, entropy, property estimates
 };
 
 /// Writes the map so that `path` holds either what it held before or the whole new map, also through a crash or a full

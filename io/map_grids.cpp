@@ -1,7 +1,9 @@
 #include "io/map_grids.h"
 
 #include <algorithm>
+#include <iterator>
 #include <memory>
+#include <utility>
 
 #include "core/error.h"
 #include "io/vdb_file.h"
@@ -53,25 +55,9 @@ openvdb::GridBase::Ptr clipped(const Map& map, const openvdb::GridBase::Ptr& gri
   return grid;
 }
 
-/// What of class state only few maps have, and beliefs of maps with classes.
-void add_class_grids(const Map& map, const TouchViews& touched, std::vector<MapGrid>& grids) {
-  const auto any = [&](auto has) { return std::any_of(map.store.blocks().begin(), map.store.blocks().end(), has); };
-  if (any([](const Block& b) { return b.geometry->observed() && b.even_evidence != nullptr; }))
-    grids.push_back({"evidence_even", [&] { return even_evidence_grid(map); }});
-  if (any([](const Block& b) { return b.geometry->observed() && b.instance != nullptr; })) {
-    grids.push_back({"instance", [&] { return instance_grid(map); }});
-    grids.push_back({"instance_votes", [&] { return instance_votes_grid(map); }});
-  }
-  if (map.classes.size() == 0) return;
-  grids.push_back({"label", [&map, touched] { return label_grid(map, *touched); }});
-  grids.push_back({"label_prob", [&map, touched] { return label_probability_grid(map, *touched); }});
-  grids.push_back({"entropy", [&map, touched] { return entropy_grid(map, *touched); }});
-  grids.push_back({"evidence_total", [&map] { return total_evidence_grid(map); }});
-}
-
 }  // namespace
 
-std::vector<MapGrid> map_grids(const Map& map) {
+std::vector<MapGrid> state_grids(const Map& map) {
   std::vector<MapGrid> grids;
   grids.push_back({"tsdf", [&] { return tsdf_grid(map); }, true});
   grids.push_back({"weight", [&] { return weight_grid(map); }, true});
@@ -84,12 +70,34 @@ std::vector<MapGrid> map_grids(const Map& map) {
     if (const auto& blocks = lists->evidence[size_t(slot)]; !blocks.empty())
       grids.push_back(
           {evidence_name(map, slot), [&map, lists, slot, &blocks] { return evidence_grid(map, slot, blocks); }});
-  const auto touched = std::make_shared<const std::vector<TouchView>>(touch_views(map));
-  add_class_grids(map, touched, grids);
+  const auto any = [&](auto has) { return std::any_of(map.store.blocks().begin(), map.store.blocks().end(), has); };
+  if (any([](const Block& b) { return b.even_evidence != nullptr && b.geometry->observed(); }))
+    grids.push_back({"evidence_even", [&] { return even_evidence_grid(map); }});
+  if (any([](const Block& b) { return b.instance != nullptr && b.geometry->observed(); })) {
+    grids.push_back({"instance", [&] { return instance_grid(map); }});
+    grids.push_back({"instance_votes", [&] { return instance_votes_grid(map); }});
+  }
   for (const Touch& touch : map.touches.touches)
     grids.push_back({touch_region_name(touch),
                      [&map, &touch] { return region_grid(map, touch.region, touch_region_name(touch)); }});
+  return grids;
+}
+
+std::vector<MapGrid> view_grids(const Map& map) {
+  std::vector<MapGrid> grids;
+  if (map.classes.size() == 0) return grids;
+  const auto touched = std::make_shared<const std::vector<TouchView>>(touch_views(map));
+  grids.push_back({"label", [&map, touched] { return label_grid(map, *touched); }});
+  grids.push_back({"label_prob", [&map, touched] { return label_probability_grid(map, *touched); }});
+  grids.push_back({"entropy", [&map, touched] { return entropy_grid(map, *touched); }});
+  grids.push_back({"evidence_total", [&map] { return total_evidence_grid(map); }});
   for (NamedGrid& grid : touch_grids(map, touched)) grids.push_back({std::move(grid.name), std::move(grid.make)});
+  return grids;
+}
+
+std::vector<MapGrid> map_grids(const Map& map) {
+  std::vector<MapGrid> grids = state_grids(map), views = view_grids(map);
+  std::move(views.begin(), views.end(), std::back_inserter(grids));
   return grids;
 }
 

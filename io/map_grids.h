@@ -18,9 +18,12 @@ struct MapGrid {
   bool noisy = false;  ///< values that compression hardly shortens: distances, weights, colours
 };
 
-/// Every grid of a map file in the order in which the file holds them: state, then views (docs/file_format.md). `map`
-/// must outlive the result. What is large is made by `make` only, so that the file's size does not decide about memory.
-std::vector<MapGrid> map_grids(const Map& map);
+/// The grids of a map file in the order in which the file holds them (docs/file_format.md): what a map is loaded from,
+/// then what follows from it. `map` must outlive the result and stay as it is. What is large is made by `make` only, so
+/// that the file's size does not decide about memory.
+std::vector<MapGrid> state_grids(const Map& map);
+std::vector<MapGrid> view_grids(const Map& map);
+std::vector<MapGrid> map_grids(const Map& map);  ///< both
 
 /// Which grids of a map to write for viewing, and how.
 struct VdbExport {
