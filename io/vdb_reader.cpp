@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <memory>
+#include <type_traits>
 
 #include "core/error.h"
 
@@ -162,7 +162,10 @@ private:
 
   template <typename Value>
   static Value negative(const Value& v) {
-    return Value(-v);
+    if constexpr (std::is_integral_v<Value>)
+      return Value(0u - uint32_t(v));  // the least integer has no opposite
+    else
+      return Value(-v);
   }
 
   /// What stands before the values: how inactive ones are told.
