@@ -69,6 +69,13 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
   command.add_option("SEQUENCE", a.sequence, "Folder of a recorded RGB-D sequence, or a .sens file")->required();
   command.add_option("--out", a.out, "Folder for map.vdb, mesh.ply and report.json")->required();
   command.add_flag("--force", a.overwrite, "Replace results that exist there, each when the new one is whole");
+  command
+      .add_option("--checkpoint", a.checkpoint_every,
+                  "Save the map every so many frames, so that no accident loses more than those; 0: at the end only")
+      ->check(CLI::NonNegativeNumber)
+      ->option_text("N");
+  command.add_flag("--resume", a.resume,
+                   "Go on with the map in --out, however its run ended; the result is that of a run that never ended");
   command.add_option("--config", a.config, "YAML file with any of these settings; the command line wins")
       ->option_text("FILE");
 
@@ -118,6 +125,7 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   ReconstructConfig file;
   if (!a.config.empty()) problems.attempt([&] { file = read_reconstruct_config(a.config); });
   options.sequence = a.sequence, options.out = a.out, options.overwrite = a.overwrite;
+  options.checkpoint_every = a.checkpoint_every, options.resume = a.resume;
   options.threads = threads > 0 ? threads : file.threads.value_or(0);
 
   SequenceOptions& reading = options.reading;

@@ -23,7 +23,9 @@ struct ReconstructOptions {
   PerceptionArguments perception;
   LabelSettings labels;
   bool overwrite = false;
-  int threads = 0;  ///< 0: all hardware threads
+  int64_t checkpoint_every = 0;  ///< frames; 0: only at the end
+  bool resume = false;           ///< go on with the map in `out`, where there is one
+  int threads = 0;               ///< 0: all hardware threads
 };
 
 /// The command line's own words. What is left empty keeps the default or the configuration file's value.
@@ -35,7 +37,8 @@ struct ReconstructArguments {
   std::optional<WeightModel> weight;
   PerceptionArguments perception;
   LabelSettings label_settings;
-  bool ray_length = false, no_color = false, carve = false, overwrite = false;
+  bool ray_length = false, no_color = false, carve = false, overwrite = false, resume = false;
+  int64_t checkpoint_every = 0;
 };
 
 void add_reconstruct_options(CLI::App& command, ReconstructArguments& arguments);

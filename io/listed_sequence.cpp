@@ -10,6 +10,7 @@
 #include "io/image_decode.h"
 #include "io/probability_images.h"
 #include "io/registration.h"
+#include "io/sequence_fingerprint.h"
 #include "io/text_input.h"
 #include "io/trajectory_file.h"
 
@@ -99,6 +100,7 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   info_.properties_file = listing_.properties_file;
   info_.touches_file = listing_.touches_file;
   info_.recorded_frames = int64_t(listing_.frames.size());
+  info_.fingerprint = fingerprint(listing_);
   find_camera(path);
 
   std::vector<FrameRecord> selected;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "inference/class_posterior.h"
 #include "inference/decision.h"
 #include "inference/information_gain.h"
 #include "inference/material.h"
@@ -71,8 +72,14 @@ Belief vision_belief(Vision vision, size_t label) {
 MaterialPosterior posterior(const LabelExperiment& e, const std::vector<Nig>& prior, const SimulatedRegion& region,
                             int touches) {
   const Belief vision = vision_belief(e.vision, region.label);
-  return material_posterior(vision, prior, statistics_of(std::span(region.reading).first(size_t(touches))),
-                            e.assumed_rho);
+  const auto readings = std::span(region.reading).first(size_t(touches));
+  if (e.fed_back) return material_posterior(vision, prior, statistics_of(readings), e.assumed_rho);
+  MaterialPosterior unchanged = material_posterior(vision, prior, ReadingStatistics{}, e.assumed_rho);
+  Belief evidence{};
+  for (size_t c = 0; c < kClasses; ++c)
+    for (const double psi : readings) evidence[c] += log_evidence(prior[c], psi);
+  unchanged.belief = class_posterior(vision, evidence);
+  return unchanged;
 }
 
 /// Expected information of the next reading in a region.

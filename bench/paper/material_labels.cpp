@@ -107,6 +107,25 @@ void correlated_readings(int regions, Checks& checks) {
       }
 }
 
+/// Several touches as Algorithm 1 prints them: each compared with the prior, the updated parameters not fed back.
+void without_feedback(int regions, Checks& checks) {
+  std::printf(
+      "\nUpdated parameters not fed back (everywhere; correlation 0.8 taken as independent in the second part):\n");
+  print_header("correlation");
+  const auto run = [&](const char* rho, LabelExperiment e, const char* method, double expected, double digit) {
+    e.fed_back = false;
+    const LabelOutcome o = simulate_labels(e, regions);
+    print_row(rho, e.touches, method, o);
+    checks.within(std::string("not fed back, ") + method + ", touches: " + std::to_string(e.touches), o.macro(),
+                  o.macro_error(), expected, digit);
+  };
+  constexpr double kPrintedPrior[] = {0.345, 0.23, 0.22}, kIndependent[] = {0.831, 0.827, 0.796, 0.766, 0.742};
+  for (int t = 1; t <= 3; ++t)
+    run("0", experiment(Places::everywhere, kTheirs, t), kTheirs.name, kPrintedPrior[t - 1], t == 1 ? 0.001 : 0.01);
+  for (int t = 1; t <= 5; ++t)
+    run("0.8", experiment(Places::everywhere, kOurs, t, 0.8, 0), "taken as independent", kIndependent[t - 1], 0.001);
+}
+
 }  // namespace
 
 void material_labels(const Options& options, Checks& checks) {
@@ -114,6 +133,7 @@ void material_labels(const Options& options, Checks& checks) {
   std::printf("\n## Material labels\n\n%d regions of each class; intervals are 1.96 standard errors.\n", regions);
   both_protocols(regions, checks);
   correlated_readings(regions, checks);
+  without_feedback(regions, checks);
 }
 
 }  // namespace felt::paper
