@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "core/class_table.h"
 
@@ -12,5 +13,8 @@ namespace felt {
 /// void, background, ignore). Classes without a colour get one. Throws IoError, or ConfigError with every problem found
 /// (path:line).
 ClassTable read_class_table(const std::filesystem::path& path);
+
+/// The text of a `classes.yaml` that reads as this table.
+std::string class_table_yaml(const ClassTable& classes);
 
 }  // namespace felt

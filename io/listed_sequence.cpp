@@ -10,6 +10,7 @@
 #include "io/image_decode.h"
 #include "io/probability_images.h"
 #include "io/registration.h"
+#include "io/sequence_fingerprint.h"
 #include "io/text_input.h"
 #include "io/trajectory_file.h"
 
@@ -65,6 +66,9 @@ public:
 
   const SequenceInfo& info() const override { return info_; }
   int64_t size() const override { return int64_t(listing_.frames.size()); }
+  FrameName name(int64_t i) const override {
+    return {listing_.frames[size_t(i)].index, listing_.frames[size_t(i)].stamp_s};
+  }
   ReadResult read(int64_t i) const override;
 
 private:
@@ -73,6 +77,7 @@ private:
   DepthImage read_depth(const ImageSource& source) const;
   ColorImage read_color(const ImageSource& source, const DepthImage& depth_m) const;
   Image<uint16_t> read_ids(const ImageSource& source, const std::string& kind, const DepthImage& depth_m) const;
+  Image<uint16_t> read_masks(const std::vector<ImageSource>& masks, const DepthImage& depth_m) const;
   ProbabilityImage read_probabilities(const ImageSource& source, const LabelImage& labels) const;
   ProbabilityImage read_class_maps(const FrameRecord& frame) const;
   PinholeCamera camera_of_color_grid(int width, int height) const;
@@ -92,7 +97,10 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   info_.pose_convention = to_string(listing_.pose_convention);
   info_.classes = listing_.classes;
   info_.notes = listing_.notes;
+  info_.properties_file = listing_.properties_file;
+  info_.touches_file = listing_.touches_file;
   info_.recorded_frames = int64_t(listing_.frames.size());
+  info_.fingerprint = fingerprint(listing_);
   find_camera(path);
 
   std::vector<FrameRecord> selected;
@@ -108,7 +116,7 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   info_.has_labels = any([](const FrameRecord& f) { return !f.labels.empty(); });
   info_.has_probabilities = any([](const FrameRecord& f) { return !f.probabilities.empty() || !f.class_maps.empty(); });
   with_instances_ = options.read_instances;
-  info_.has_instances = any([](const FrameRecord& f) { return !f.instances.empty(); });
+  info_.has_instances = any([](const FrameRecord& f) { return !f.instances.empty() || !f.masks.empty(); });
 
   if (listing_.depth_is_ray_length) {
     z_per_ray_length_ = Image<float>(info_.camera.width, info_.camera.height);
@@ -163,6 +171,7 @@ ReadResult ListedSequence::read(int64_t i) const {
     if (!record.labels.empty()) frame.labels = read_ids(record.labels, "label", frame.depth_m);
     if (with_instances_ && !record.instances.empty())
       frame.instances = read_ids(record.instances, "instance", frame.depth_m);
+    if (with_instances_ && !record.masks.empty()) frame.instances = read_masks(record.masks, frame.depth_m);
     if (!record.probabilities.empty())
       frame.probabilities = read_probabilities(record.probabilities, frame.labels);
     else if (!record.class_maps.empty())
@@ -257,6 +266,32 @@ Image<uint16_t> ListedSequence::read_ids(const ImageSource& source, const std::s
                                  size_text(image.width(), image.height()))};
   return registered_to_depth<uint16_t>(image, camera_of_color_grid(image.width(), image.height()), depth_m,
                                        info_.camera, listing_.T_color_depth, kNoLabel);
+}
+
+Image<uint16_t> ListedSequence::read_masks(const std::vector<ImageSource>& masks, const DepthImage& depth_m) const {
+  // Where masks overlap the smaller one is on top: a cup on its table. A soft mask counts from half of its peak.
+  struct Mask {
+    Image<uint16_t> image;
+    uint16_t least, number;
+    int64_t area;
+  };
+  std::vector<Mask> all;
+  for (const ImageSource& source : masks) {
+    if (all.size() + 1 == kNoLabel) throw Skip{"too many masks", source.path.parent_path().string()};
+    Mask mask{read_ids(source, "mask", depth_m), 1, uint16_t(all.size() + 1), 0};
+    for (uint16_t& value : mask.image)
+      if (value == kNoLabel) value = 0;  // outside the labelled image
+    mask.least = uint16_t(std::max(1, (*std::max_element(mask.image.begin(), mask.image.end()) + 1) / 2));
+    mask.area =
+        std::count_if(mask.image.begin(), mask.image.end(), [&](uint16_t value) { return value >= mask.least; });
+    all.push_back(std::move(mask));
+  }
+  std::stable_sort(all.begin(), all.end(), [](const Mask& a, const Mask& b) { return a.area > b.area; });
+  Image<uint16_t> instances(info_.camera.width, info_.camera.height, 0);
+  for (const Mask& mask : all)
+    for (size_t p = 0; p < instances.size(); ++p)
+      if (mask.image.data()[p] >= mask.least) instances.data()[p] = mask.number;
+  return instances;
 }
 
 /// What the values of a probability image are out of: 255 or 65535.

@@ -93,6 +93,7 @@ void apply_options(const SequenceOptions& options, SequenceListing& listing) {
   choose_class_table(options, listing);
   if (!options.labels_dir.empty()) attach_labels(options.labels_dir, listing);
   if (!options.probs_dir.empty()) attach_probabilities(options.probs_dir, listing);
+  if (!options.instances_dir.empty()) attach_instances(options.instances_dir, listing);
   if (listing.classes.empty() && !(options.labels_dir.empty() && options.probs_dir.empty()))
     throw ConfigError(describe_mismatch((options.labels_dir.empty() ? options.probs_dir : options.labels_dir).string(),
                                         "class table",

@@ -36,6 +36,7 @@ struct FrameRecord {
   ImageSource depth, color, labels, instances;
   ImageSource probabilities;            ///< stacked top-m image, or confidence of the labels (io/probability_images.h)
   std::vector<ClassMap> class_maps;     ///< probability images of single classes; class 0: the rest
+  std::vector<ImageSource> masks;       ///< one thing each, instead of `instances`
   std::optional<Eigen::Matrix4d> pose;  ///< as recorded; absent: read from `pose_file`
   std::filesystem::path pose_file;      ///< empty and no `pose`: the frame has none
   std::string fault, fault_detail;      ///< why the layout already knows that it cannot be used
@@ -54,6 +55,7 @@ struct SequenceListing {
   bool depth_is_ray_length = false;
   PoseConvention pose_convention;
   ClassTable classes;
+  std::filesystem::path properties_file, touches_file;  ///< empty: the sequence carries none
   std::vector<std::string> notes;
 };
 

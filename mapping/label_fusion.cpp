@@ -120,7 +120,7 @@ struct SoftPixel {
       if (slot != ClassTable::kNoSlot)
         named.push_back({slot, p[i]});
       else
-        unknown = unknown || !classes.known(ids[i]);
+        unknown = unknown || (ids[i] != kNoLabel && !classes.known(ids[i]));
     }
     constexpr float kTooMuch = 1.001f;
     valid = valid && sum <= kTooMuch;

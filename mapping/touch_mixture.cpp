@@ -11,11 +11,12 @@ namespace {
 
 bool is_mixture(const Touch& touch) { return !touch.undone && touch.request.model == TouchModel::mixture; }
 
-/// Properties with an active `mixture` touch, ascending.
-std::vector<int> mixed_properties(const Map& map) {
+/// Touched properties, ascending: a voxel that `material` touches of one and `mixture` touches of another cover has a
+/// state in both.
+std::vector<int> touched_properties(const Map& map) {
   std::vector<int> properties;
   for (const Touch& touch : map.touches.touches)
-    if (is_mixture(touch)) properties.push_back(*map.properties.index_of(touch.request.property));
+    if (!touch.undone) properties.push_back(*map.properties.index_of(touch.request.property));
   std::sort(properties.begin(), properties.end());
   properties.erase(std::unique(properties.begin(), properties.end()), properties.end());
   return properties;
@@ -129,7 +130,7 @@ MixtureState mixture_state(const Map& map, const Region& region) {
     of_model = united(of_model, touch.region);
   }
   mixed = intersected(mixed, region);
-  const std::vector<int> properties = mixed_properties(map);
+  const std::vector<int> properties = touched_properties(map);
   out.blocks.resize(mixed.blocks());
   tbb::parallel_for(size_t(0), mixed.blocks(), [&](size_t b) {
     MixtureBlock& block = out.blocks[b];
