@@ -5,6 +5,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "apps/reading_options.h"
 #include "io/sequence_options.h"
 #include "mapping/integration_config.h"
 
@@ -23,12 +24,13 @@ struct ReconstructOptions {
 
 /// The command line's own words. What is left empty keeps the default or the configuration file's value.
 struct ReconstructArguments {
-  std::filesystem::path config, sequence, out, labels, probs, classes;
-  std::string format, intrinsics, pose_convention, depth_encoding, frames, truncation;
-  std::optional<double> depth_scale, max_dt_s, voxel_size_m, min_depth_m, max_depth_m, max_weight;
+  std::filesystem::path config, sequence, out;
+  ReadingArguments reading;
+  std::string truncation;
+  std::optional<double> voxel_size_m, min_depth_m, max_depth_m, max_weight;
   std::optional<DistanceModel> distance;
   std::optional<WeightModel> weight;
-  bool ray_length = false, no_color = false, carve = false, overwrite = false;
+  bool carve = false, overwrite = false;
 };
 
 void add_reconstruct_options(CLI::App& command, ReconstructArguments& arguments);
