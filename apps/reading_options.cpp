@@ -25,8 +25,11 @@ void add_reading_options(CLI::App& command, ReadingArguments& a) {
       ->group(reading);
   command.add_option("--labels", a.labels, "Folder of label images")->group(reading);
   command.add_option("--label-offset", a.label_offset, "Added to every label id")->group(reading);
-  command.add_option("--probs", a.probs, "Folder of class probability images")->group(reading);
-  command.add_option("--classes", a.classes, "Class table (classes.yaml)")->group(reading);
+  command
+      .add_option("--probs", a.probs,
+                  "Folder of class probability images (docs/semantics.md), or of confidences beside --labels")
+      ->group(reading);
+  command.add_option("--classes", a.classes, "Class table (classes.yaml, or a CSV of id and name)")->group(reading);
   command.add_flag("--bgr", a.bgr, "Colour images hold red and blue exchanged")->group(reading);
   command.add_flag("--no-color", a.no_color, "Do not read colour images")->group(reading);
 }

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "apps/label_options.h"
 #include "core/error.h"
 #include "io/reconstruct_config.h"
 
@@ -51,6 +52,7 @@ public:
               const std::string& found) {
     if (!good) messages_.push_back(describe_mismatch(where, what, expected, found));
   }
+  void add(const std::string& message) { messages_.push_back(message); }
   void throw_if_any() const {
     if (!messages_.empty()) throw ConfigError(messages_);
   }
@@ -67,6 +69,13 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
   command.add_option("SEQUENCE", a.sequence, "Folder of a recorded RGB-D sequence, or a .sens file")->required();
   command.add_option("--out", a.out, "Folder for map.vdb, mesh.ply and report.json")->required();
   command.add_flag("--force", a.overwrite, "Replace results that exist there, each when the new one is whole");
+  command
+      .add_option("--checkpoint", a.checkpoint_every,
+                  "Save the map every so many frames, so that no accident loses more than those; 0: at the end only")
+      ->check(CLI::NonNegativeNumber)
+      ->option_text("N");
+  command.add_flag("--resume", a.resume,
+                   "Go on with the map in --out, however its run ended; the result is that of a run that never ended");
   command.add_option("--config", a.config, "YAML file with any of these settings; the command line wins")
       ->option_text("FILE");
 
@@ -86,6 +95,12 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
   command.add_flag("--carve", a.carve, "Let free space seen later erase what stood there")->group(map);
 
   add_reading_options(command, a.reading);
+  const char* reading = "Sequence (found in it, or the layout's default, unless given)";
+  command.add_option("--properties", a.properties, "Property table (properties.yaml)")->group(reading);
+  command.add_option("--touches", a.touches, "Recorded touches (touches.csv), each at its stamp or frame")
+      ->group(reading);
+  add_label_options(command, a.label_settings);
+  a.perception.add_to(command, "Perception", "--segmenter");
 }
 
 ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
@@ -94,24 +109,33 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   ReconstructConfig file;
   if (!a.config.empty()) problems.attempt([&] { file = read_reconstruct_config(a.config); });
   options.sequence = a.sequence, options.out = a.out, options.overwrite = a.overwrite;
+  options.checkpoint_every = a.checkpoint_every, options.resume = a.resume;
   options.threads = threads > 0 ? threads : file.threads.value_or(0);
 
-  SequenceOptions reading;
-  reading.format = file.format.value_or("");
-  reading.labels_dir = file.labels, reading.probs_dir = file.probs, reading.classes_file = file.classes;
-  reading.intrinsics = file.intrinsics;
-  reading.pose_convention = file.pose_convention;
-  reading.depth_encoding = file.depth_encoding;
-  reading.frames = file.frames.value_or(reading.frames);
-  reading.depth_scale = file.depth_scale;
-  reading.depth_is_ray_length = file.ray_length;
-  reading.max_dt_s = file.max_dt_s.value_or(reading.max_dt_s);
-  reading.read_color = file.color.value_or(true);
+  SequenceOptions configured;
+  configured.format = file.format.value_or("");
+  configured.labels_dir = file.labels, reading.probs_dir = file.probs, reading.classes_file = file.classes;
+  options.properties = a.properties.empty() ? file.properties : a.properties;
+  options.touches = a.touches.empty() ? file.touches : a.touches;
+  configured.intrinsics = file.intrinsics;
+  configured.pose_convention = file.pose_convention;
+  configured.depth_encoding = file.depth_encoding;
+  configured.frames = file.frames.value_or(configured.frames);
+  configured.depth_scale = file.depth_scale;
+  configured.depth_is_ray_length = file.ray_length;
+  configured.max_dt_s = file.max_dt_s.value_or(configured.max_dt_s);
+  configured.read_color = file.color.value_or(true);
   problems.attempt([&] {
     std::vector<std::string> found;
-    options.reading = apps::resolve(a.reading, reading, found);
+    options.reading = apps::resolve(a.reading, configured, found);
     if (!found.empty()) throw ConfigError(found);
   });
+
+  SequenceOptions& reading = options.reading;
+  options.perception = a.perception;
+  reading.instances_dir = a.perception.instances;
+  if (!a.perception.net.empty())
+    problems.expect(reading.read_color, "--segmenter", "colour", "colour images to look at", "--no-color");
 
   options.voxel_size_m = a.voxel_size_m.value_or(file.voxel_size_m.value_or(options.voxel_size_m));
   problems.expect(positive(options.voxel_size_m), "--voxel-size", "edge of a voxel in metres", "a number above 0",
@@ -141,6 +165,10 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
                   "a number above the smallest depth, " + text_of(fusion.min_depth_m), text_of(fusion.max_depth_m));
   problems.expect(fusion.max_weight >= 1, "--max-weight", "summed weight", "a number of at least 1",
                   text_of(fusion.max_weight));
+  options.labels = overlaid(a.label_settings, file.label_settings);
+  for (const std::string& problem : problems_of(options.labels)) problems.add(problem);
+  fusion.labels = label_config(options.labels);
+  reading.read_instances = fusion.labels.instances || a.perception.vote == SegmentSource::instances;
   problems.throw_if_any();
   return options;
 }
@@ -163,11 +191,14 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   if (!reading.labels_dir.empty()) json["labels"] = reading.labels_dir.string();
   if (!reading.probs_dir.empty()) json["probs"] = reading.probs_dir.string();
   if (!reading.classes_file.empty()) json["classes"] = reading.classes_file.string();
+  if (!options.properties.empty()) json["properties"] = options.properties.string();
+  if (!options.touches.empty()) json["touches"] = options.touches.string();
   json["max_dt_s"] = reading.max_dt_s;
   if (reading.pose_stamp_offset != 0) json["stamp_offset"] = reading.pose_stamp_offset;
   if (reading.label_offset != 0) json["label_offset"] = reading.label_offset;
   if (reading.bgr) json["bgr"] = true;
   json["color"] = reading.read_color;
+  if (options.perception.asked()) json["perception"] = to_json(options.perception);
   json["voxel_size_m"] = options.voxel_size_m;
   json["truncation_m"] = options.truncation_m;
   json["min_depth_m"] = short_decimal(fusion.min_depth_m);
@@ -177,6 +208,7 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   json["max_weight"] = short_decimal(fusion.max_weight);
   json["dropoff_start_vox"] = short_decimal(fusion.dropoff_start_vox);
   json["carve"] = fusion.carve;
+  add_to_json(options.labels, fusion.labels, json);
   return json;
 }
 

@@ -44,6 +44,7 @@ struct SequenceOptions {
   FrameSelection frames{};                 ///< positions in recorded order
   std::filesystem::path labels_dir{};      ///< label images, stems are frame numbers
   std::filesystem::path probs_dir{};       ///< probability maps
+  std::filesystem::path instances_dir{};   ///< instance images, or folders of masks
   std::filesystem::path classes_file{};    ///< classes.yaml
   std::optional<Intrinsics> intrinsics{};  ///< of the depth image
   std::optional<double> depth_scale{};     ///< stored depth units per metre
@@ -55,6 +56,7 @@ struct SequenceOptions {
   int label_offset = 0;          ///< added to every label id; ids that leave 16 bits become kNoLabel
   bool bgr = false;              ///< colour images hold red and blue exchanged
   bool read_color = true;        ///< false: colour is not decoded, and frames without it are whole
+  bool read_instances = true;    ///< false: instance images are not decoded
 };
 
 }  // namespace felt

@@ -41,6 +41,7 @@ std::vector<DepthImage> few_depths(const std::filesystem::path& path, const Sequ
   SequenceListing bare = listing;
   for (FrameRecord& frame : bare.frames) {
     frame.color = frame.labels = frame.instances = frame.probabilities = {};
+    frame.masks.clear();
     frame.class_maps.clear();
   }
   const auto reader = plain_reader(path, depth_only, std::move(bare));
