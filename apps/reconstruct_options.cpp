@@ -114,7 +114,7 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
 
   SequenceOptions configured;
   configured.format = file.format.value_or("");
-  configured.labels_dir = file.labels, reading.probs_dir = file.probs, reading.classes_file = file.classes;
+  configured.labels_dir = file.labels, configured.probs_dir = file.probs, configured.classes_file = file.classes;
   options.properties = a.properties.empty() ? file.properties : a.properties;
   options.touches = a.touches.empty() ? file.touches : a.touches;
   configured.intrinsics = file.intrinsics;
