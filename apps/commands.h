@@ -8,10 +8,12 @@ namespace felt::apps {
 
 // Each adds one subcommand; it lives in apps/<command>.cpp and is called from apps/main.cpp, in the order of `--help`.
 void add_reconstruct(CLI::App& app);
+void add_segment(CLI::App& app);
 void add_info(CLI::App& app);
 void add_export(CLI::App& app);
 void add_render(CLI::App& app);
 void add_evaluate(CLI::App& app);
+void add_calibrate_labels(CLI::App& app);
 void add_touch(CLI::App& app);
 void add_region(CLI::App& app);
 void add_query(CLI::App& app);

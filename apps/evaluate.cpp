@@ -1,15 +1,21 @@
 #include <cstdio>
-#include <nlohmann/json.hpp>
+#include <memory>
+#include <optional>
 
 #include "apps/camera_options.h"
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/progress.h"
+#include "apps/touch_options.h"
 #include "core/error.h"
+#include "io/class_table_file.h"
+#include "io/evaluation_report.h"
 #include "io/map_file.h"
 #include "io/mesh_io.h"
+#include "io/open_sequence.h"
 #include "io/pose_list.h"
-#include "mapping/evaluate_geometry.h"
+#include "io/touches.h"
 #include "mapping/marching_cubes.h"
 
 namespace felt::apps {
@@ -21,71 +27,251 @@ struct EvaluateCommand {
   CommonOptions common;
   CameraOptions camera;
   std::string input, reference_mesh, trajectory;
+  std::string reference_labels, labels, classes, format, frames, label_name, reliability;
+  std::string reference_readings, properties;
+  bool class_images = false;
   GeometryOptions geometry;
   ObservingCameras cameras;
+  CLI::Option* intrinsics = nullptr;
 };
 
-TriangleMesh mesh_of(const fs::path& path) {
-  return path.extension() == ".vdb" ? extract_mesh(load_map(path), {.normals = false, .colors = false})
-                                    : read_mesh(path);
+/// What is evaluated: a map, or a mesh, or the map's mesh where geometry is asked for.
+struct Evaluated {
+  std::optional<Map> map;
+  std::optional<TriangleMesh> mesh;
+};
+
+std::unique_ptr<SequenceReader> open_reference(const EvaluateCommand& command, const std::string& path) {
+  SequenceOptions options;
+  options.read_color = false;
+  options.format = command.format;
+  options.labels_dir = command.labels;
+  options.classes_file = command.classes;
+  if (command.intrinsics->count() > 0) options.intrinsics = parse_intrinsics(command.camera.intrinsics, "--intrinsics");
+  if (!command.frames.empty()) options.frames = parse_frame_selection(command.frames, "--frames");
+  return open_sequence(path, options);
 }
 
-/// What every figure is, for readers of the JSON.
-Json geometry_definitions(const EvaluateCommand& command) {
-  const std::string threshold = std::to_string(command.geometry.threshold_m) + " m";
-  Json json;
-  json["samples"] = "points spread evenly over the area of each mesh (stratified, seed " +
-                    std::to_string(command.geometry.seed) + "); distances are exact, to the nearest triangle";
-  json["accuracy"] =
-      "distance of a sample of the reconstruction to the reference, metres: mean, median, root mean square";
-  json["completion"] = "distance of a sample of the reference to the reconstruction, metres: mean, median";
-  json["precision"] = "share of samples of the reconstruction nearer than " + threshold + " to the reference";
-  json["recall"] =
-      "completion ratio: share of samples of the reference nearer than " + threshold + " to the reconstruction";
-  json["f_score"] = "harmonic mean of precision and recall";
-  json["normal_consistency"] =
-      "mean |n . n'| of the triangle normals at a sample and at its nearest point, mean of both directions";
-  json["reference_seen"] = command.trajectory.empty()
-                               ? "1: every sample of the reference counts (no trajectory given)"
-                               : "share of the reference's samples inside the image and depth range of a camera of the "
-                                 "trajectory and first on its ray against the reference; only these count";
+/// Poses of a file with the camera given, or both of a sequence.
+void read_cameras(EvaluateCommand& command) {
+  ObservingCameras& cameras = command.cameras;
+  if (!fs::is_directory(command.trajectory)) {
+    cameras.camera = camera_of(command.camera);
+    cameras.T_world_camera = read_poses(command.trajectory);
+    return;
+  }
+  SequenceOptions options;
+  options.read_color = false;
+  if (command.intrinsics->count() > 0) options.intrinsics = parse_intrinsics(command.camera.intrinsics, "--intrinsics");
+  const auto sequence = open_sequence(command.trajectory, options);
+  cameras.camera = sequence->info().camera;
+  for (int64_t i = 0; i < sequence->size(); ++i) {
+    const ReadResult result = sequence->read(i);
+    if (const auto* frame = std::get_if<Frame>(&result)) cameras.T_world_camera.push_back(frame->T_world_camera);
+  }
+}
+
+/// Scores of a sequence's labels with the classes they are over.
+struct SequenceLabels {
+  LabelScores scores;
+  ClassTable classes;
+  std::map<std::string, int64_t> skipped;  ///< frames by reason
+};
+
+SequenceLabels evaluate_sequence_labels(const EvaluateCommand& command, const Evaluated& evaluated) {
+  const auto sequence = open_reference(command, command.reference_labels);
+  const ClassTable& truth = sequence->info().classes;
+  const ClassTable& classes = evaluated.map ? evaluated.map->classes : truth;
+  if (classes.empty())
+    throw ConfigError(evaluated.map ? describe_mismatch(command.input, "classes", "a map with classes", "none")
+                                    : describe_mismatch(command.reference_labels, "class table",
+                                                        "one in the sequence, or --classes", "none"));
+  const TruthClasses slots(classes, truth);
+  std::optional<RayCaster> caster;
+  std::optional<VoxelBeliefs> beliefs;
+  std::optional<LabelledMesh> mesh;
+  if (evaluated.map)
+    caster.emplace(*evaluated.map), beliefs.emplace(*evaluated.map);
+  else
+    mesh.emplace(*evaluated.mesh, command.label_name.empty() ? "label" : command.label_name, command.input);
+  SequenceLabels result{LabelScores(classes.size()), classes, {}};
+  ProgressBar progress("frames", sequence->size(), !command.common.quiet);
+  for (int64_t i = 0; i < sequence->size(); ++i) {
+    progress.update(i);
+    const ReadResult read = sequence->read(i);
+    if (const auto* skipped = std::get_if<SkippedFrame>(&read)) {
+      ++result.skipped[skipped->reason];
+      continue;
+    }
+    const Frame& frame = std::get<Frame>(read);
+    if (frame.labels.empty()) {
+      ++result.skipped["no labels"];
+      continue;
+    }
+    const double max_depth_m = command.cameras.max_depth_m;
+    // Through a hole a ray may meet something far behind the true surface: that is then what is predicted.
+    const double farthest_m = 2 * max_depth_m;
+    const LabelPrediction prediction =
+        evaluated.map ? predict_labels(*caster, *beliefs, frame.camera, frame.T_world_camera, farthest_m)
+                      : predict_labels(*mesh, slots, frame.camera, frame.T_world_camera, farthest_m);
+    add_view(result.scores, prediction, {&frame.labels, &frame.depth_m, command.cameras.min_depth_m, max_depth_m},
+             slots, command.class_images);
+  }
+  if (result.scores.views == 0)
+    throw FormatError(describe_mismatch(command.reference_labels, "frames", "at least one with labels", "none"));
+  return result;
+}
+
+LabelScores evaluate_mesh_labels(const EvaluateCommand& command, const Evaluated& evaluated,
+                                 const TriangleMesh& reference, ClassTable& classes) {
+  const ClassTable truth = command.classes.empty() ? ClassTable() : read_class_table(command.classes);
+  classes = evaluated.map ? evaluated.map->classes : truth;
+  if (classes.empty())
+    throw ConfigError(describe_mismatch("evaluate --label-name", "classes",
+                                        evaluated.map ? "a map with classes" : "--classes FILE", "none"));
+  const TruthClasses slots(classes, truth);
+  const LabelledMesh labelled(reference, command.label_name, command.reference_mesh);
+  const ObservingCameras* cameras = command.trajectory.empty() ? nullptr : &command.cameras;
+  LabelScores scores(classes.size());
+  if (evaluated.map)
+    add_surface(scores, *evaluated.map, VoxelBeliefs(*evaluated.map), labelled, slots, command.geometry, cameras);
+  else
+    add_surface(scores, LabelledMesh(*evaluated.mesh, command.label_name, command.input), slots, labelled, slots,
+                command.geometry, cameras);
+  return scores;
+}
+
+/// Forecasts of the map at the places of recorded readings that it has not been given.
+Json evaluate_readings(const EvaluateCommand& command, Map& map) {
+  use_properties(map, command.properties);
+  const VoxelBeliefs beliefs(map);
+  std::map<std::string, PropertyScores> scores;
+  std::map<std::string, int64_t> refused;
+  for (const RecordedTouch& reading : read_touches(command.reference_readings)) {
+    const auto property = map.properties.index_of(reading.property);
+    if (!property || !reading.point_m) {
+      ++refused[property ? "no point in the world" : "unknown property"];
+      continue;
+    }
+    try {
+      const Index3 voxel = find_contact(map, *reading.point_m, {}).voxel;
+      const StudentTMixture next =
+          beliefs.next_reading({map.store.find(block_of_voxel(voxel)), uint16_t(offset_in_block(voxel))}, *property);
+      if (next.weight.empty())
+        ++refused["no class with a prior"];
+      else
+        scores[reading.property].add(reading.value, next);
+    } catch (const TouchError&) {
+      ++refused["not on a labelled surface"];
+    }
+  }
+  Json json = Json::object();
+  for (const auto& [name, s] : scores) json[name] = property_json(s);
+  if (!refused.empty()) json["refused"] = refused;
   return json;
 }
 
+void print_geometry(const GeometryScores& s, double threshold_m) {
+  std::printf("accuracy            mean %.5f m   median %.5f m   rms %.5f m\n", s.accuracy_mean_m, s.accuracy_median_m,
+              s.accuracy_rms_m);
+  std::printf("completion          mean %.5f m   median %.5f m   (%.1f %% of the reference counted)\n",
+              s.completion_mean_m, s.completion_median_m, 100 * s.reference_seen);
+  std::printf("within %.3f m      precision %.4f   recall %.4f   F %.4f\n", threshold_m, s.precision, s.recall,
+              s.f_score);
+  std::printf("normal consistency  %.4f\n", s.normal_consistency);
+}
+
+void print_labels(const LabelScores& s, const char* of) {
+  std::printf("labels of %-9s accuracy %.4f   mean IoU %.4f   of %llu %s\n", of, s.counts.pixel_accuracy(),
+              s.counts.mean_iou(), static_cast<unsigned long long>(s.counts.total()),
+              s.views > 0 ? "pixels" : "samples");
+  if (s.calibration.count() > 0)
+    std::printf("calibration         ECE %.4f   Brier %.4f   NLL %.4f\n", s.calibration.ece(), s.calibration.brier(),
+                s.calibration.nll());
+  if (s.images.images() > 0)
+    std::printf("class images        PSNR %.2f dB   SSIM %.4f   cross entropy %.4f\n", s.images.psnr_db(),
+                s.images.ssim(), s.images.binary_cross_entropy());
+}
+
+void check(const EvaluateCommand& c) {
+  std::vector<std::string> problems;
+  const auto need = [&](bool good, const char* option, const char* expected) {
+    if (!good) problems.push_back(describe_mismatch("evaluate", option, expected, "none"));
+  };
+  need(!c.reference_mesh.empty() || !c.reference_labels.empty() || !c.reference_readings.empty(), "reference",
+       "--reference-mesh, --reference-labels or --reference-readings");
+  need(c.reliability.empty() || !c.reference_labels.empty() || !c.label_name.empty(), "--reliability",
+       "--reference-labels, or --reference-mesh with --label-name");
+  const bool is_map = fs::path(c.input).extension() == ".vdb";
+  need(c.reference_readings.empty() || is_map, "--reference-readings", "a map (.vdb)");
+  need(!c.class_images || (is_map && !c.reference_labels.empty()), "--class-images",
+       "a map (.vdb) and --reference-labels");
+  if (!problems.empty()) throw ConfigError(problems);
+}
+
 int evaluate(EvaluateCommand& command) {
-  if (command.reference_mesh.empty())
-    throw ConfigError(describe_mismatch("evaluate", "reference", "--reference-mesh", "none"));
-  const bool culled = !command.trajectory.empty();
-  if (culled) {
-    command.cameras.camera = camera_of(command.camera);
-    command.cameras.T_world_camera = read_poses(command.trajectory);
+  check(command);
+  if (!command.trajectory.empty()) read_cameras(command);
+  Evaluated evaluated;
+  if (fs::path(command.input).extension() == ".vdb")
+    evaluated.map = load_map(command.input);
+  else
+    evaluated.mesh = read_mesh(command.input);
+  Json json = {{"input", command.input}};
+  Json definitions;
+  const bool print = !command.common.json && !command.common.quiet;
+  std::optional<CalibrationScores> calibration;
+  if (!command.reference_mesh.empty()) {
+    const TriangleMesh reference = read_mesh(command.reference_mesh);
+    const bool culled = !command.trajectory.empty();
+    const GeometryScores s = evaluate_geometry(
+        evaluated.map ? extract_mesh(*evaluated.map, {.normals = false, .colors = false}) : *evaluated.mesh, reference,
+        command.geometry, culled ? &command.cameras : nullptr);
+    json["reference_mesh"] = command.reference_mesh;
+    json["threshold_m"] = command.geometry.threshold_m;
+    json.update(geometry_json(s));
+    definitions["geometry"] = geometry_definitions(command.geometry, culled);
+    if (print) print_geometry(s, command.geometry.threshold_m);
+    if (!command.label_name.empty()) {
+      ClassTable classes;
+      const LabelScores labels = evaluate_mesh_labels(command, evaluated, reference, classes);
+      json["surface"] = label_json(labels, classes);
+      definitions["surface"] = label_definitions(
+          labels, evaluated.map ? "samples of the reference mesh whose triangle has a class, that a camera saw where a "
+                                  "trajectory is given; the prediction is that of the voxel nearest to the sample"
+                                : "samples of the reference mesh whose triangle has a class, that a camera saw where a "
+                                  "trajectory is given; the prediction is the label of the nearest point of the mesh "
+                                  "within the threshold");
+      calibration = labels.calibration;
+      if (print) print_labels(labels, "the mesh");
+    }
   }
-  const GeometryScores s = evaluate_geometry(mesh_of(command.input), read_mesh(command.reference_mesh),
-                                             command.geometry, culled ? &command.cameras : nullptr);
-  Json json;
-  json["input"] = command.input;
-  json["reference_mesh"] = command.reference_mesh;
-  json["threshold_m"] = command.geometry.threshold_m;
-  json["samples"] = {{"reconstruction", s.samples_reconstruction}, {"reference", s.samples_reference}};
-  json["reference_seen"] = s.reference_seen;
-  json["accuracy_m"] = {{"mean", s.accuracy_mean_m}, {"median", s.accuracy_median_m}, {"rms", s.accuracy_rms_m}};
-  json["completion_m"] = {{"mean", s.completion_mean_m}, {"median", s.completion_median_m}};
-  json["precision"] = s.precision;
-  json["recall"] = s.recall;
-  json["f_score"] = s.f_score;
-  json["normal_consistency"] = s.normal_consistency;
-  json["definitions"] = geometry_definitions(command);
-  if (command.common.json) {
-    std::printf("%s\n", json.dump(2).c_str());
-  } else if (!command.common.quiet) {
-    std::printf("accuracy            mean %.5f m   median %.5f m   rms %.5f m\n", s.accuracy_mean_m,
-                s.accuracy_median_m, s.accuracy_rms_m);
-    std::printf("completion          mean %.5f m   median %.5f m   (%.1f %% of the reference counted)\n",
-                s.completion_mean_m, s.completion_median_m, 100 * s.reference_seen);
-    std::printf("within %.3f m      precision %.4f   recall %.4f   F %.4f\n", command.geometry.threshold_m, s.precision,
-                s.recall, s.f_score);
-    std::printf("normal consistency  %.4f\n", s.normal_consistency);
+  if (!command.reference_labels.empty()) {
+    const SequenceLabels labels = evaluate_sequence_labels(command, evaluated);
+    json["reference_labels"] = command.reference_labels;
+    json.update(label_json(labels.scores, labels.classes));
+    if (!labels.skipped.empty()) json["labels"]["skipped_views"] = labels.skipped;
+    definitions["labels"] = label_definitions(
+        labels.scores,
+        "pixels with depth from " + Json(command.cameras.min_depth_m).dump() + " to " +
+            Json(command.cameras.max_depth_m).dump() +
+            " m whose true label is a class; the prediction is that of the surface that the pixel's ray meets first");
+    calibration = labels.scores.calibration;
+    if (print) print_labels(labels.scores, "the views");
   }
+  if (!command.reference_readings.empty()) {
+    json["properties"] = evaluate_readings(command, *evaluated.map);
+    definitions["properties"] = property_definitions();
+    if (print) std::printf("properties          %s\n", json["properties"].dump().c_str());
+  }
+  if (!command.reliability.empty()) {
+    if (!calibration || calibration->count() == 0)
+      throw ConfigError(describe_mismatch("--reliability", "class probabilities", "a map with classes", "none"));
+    write_plot_svg(command.reliability, reliability_plots(*calibration), 2);
+    json["reliability"] = command.reliability;
+  }
+  json["definitions"] = std::move(definitions);
+  if (command.common.json) std::printf("%s\n", json.dump(2).c_str());
   return kDone;
 }
 
@@ -93,29 +279,65 @@ int evaluate(EvaluateCommand& command) {
 
 void add_evaluate(CLI::App& app) {
   static EvaluateCommand command;
-  CLI::App& sub = add_command(
-      app,
-      {"evaluate", "Compare a map or mesh with a reference; --json gives the definition of every figure",
-       "feltmap evaluate out/map.vdb --reference-mesh scene/mesh.ply\n"
-       "feltmap evaluate out/mesh.ply --reference-mesh truth.ply --trajectory traj.txt --max-depth 4 --json"},
-      command.common, [] { return evaluate(command); });
+  CLI::App& sub =
+      add_command(app,
+                  {"evaluate", "Compare a map or mesh with references; --json gives the definition of every figure",
+                   "feltmap evaluate out/map.vdb --reference-mesh scene/mesh.ply --trajectory scene\n"
+                   "feltmap evaluate out/map.vdb --reference-labels scene/truth --reliability reliability.svg --json\n"
+                   "feltmap evaluate out/map.vdb --reference-readings held_out.csv"},
+                  command.common, [] { return evaluate(command); });
   sub.add_option("INPUT", command.input, "Map (.vdb) or mesh (.ply, .obj)")->required()->check(CLI::ExistingFile);
+
+  const char* geometry = "Geometry";
   sub.add_option("--reference-mesh", command.reference_mesh, "Exact mesh (.ply, .obj) in the same world frame")
-      ->check(CLI::ExistingFile);
+      ->check(CLI::ExistingFile)
+      ->group(geometry);
   sub.add_option("--samples", command.geometry.samples, "Samples on each mesh")
       ->check(CLI::Range(size_t(1), size_t(100000000)))
-      ->capture_default_str();
-  sub.add_option("--seed", command.geometry.seed, "Of the samples")->capture_default_str();
+      ->capture_default_str()
+      ->group(geometry);
+  sub.add_option("--seed", command.geometry.seed, "Of the samples")->capture_default_str()->group(geometry);
   sub.add_option("--threshold", command.geometry.threshold_m, "Metres, of precision, recall and F-score")
       ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      ->capture_default_str()
+      ->group(geometry);
   sub.add_option("--trajectory", command.trajectory,
-                 "Poses of the recording, one a line: only what they saw of the reference counts")
-      ->check(CLI::ExistingFile);
+                 "Recorded sequence, or a file with one pose a line: only what it saw of the reference counts")
+      ->check(CLI::ExistingPath)
+      ->group(geometry);
+  sub.add_flag("--cull-reconstruction", command.geometry.cull_reconstruction,
+               "Leave out what the trajectory did not see of the reconstruction, too")
+      ->group(geometry);
   add_camera_options(sub, command.camera);
+  command.intrinsics = sub.get_option("--intrinsics");
   sub.add_option("--min-depth", command.cameras.min_depth_m, "Metres, of the recording")->capture_default_str();
   sub.add_option("--max-depth", command.cameras.max_depth_m, "Metres, of the recording as fused")
       ->capture_default_str();
+
+  const char* labels = "Labels";
+  sub.add_option("--reference-labels", command.reference_labels, "Sequence with true labels, in the map's world frame")
+      ->check(CLI::ExistingPath)
+      ->group(labels);
+  sub.add_option("--labels", command.labels, "Folder of true label images, where the sequence has others or none")
+      ->group(labels);
+  sub.add_option("--classes", command.classes, "Class table of the true labels; matched with the map's by name")
+      ->group(labels);
+  sub.add_option("--format", command.format, "Layout of the sequence (else detected)")->group(labels);
+  sub.add_option("--frames", command.frames, "Frames a:b:step of the sequence")->group(labels);
+  sub.add_option("--label-name", command.label_name,
+                 "Compare labels with the reference mesh's: this scalar of its triangles, or its vertex labels")
+      ->group(labels);
+  sub.add_flag("--class-images", command.class_images, "Also PSNR, SSIM and cross entropy of class images")
+      ->group(labels);
+  sub.add_option("--reliability", command.reliability, "Write the reliability diagram (SVG)")->group(labels);
+
+  const char* properties = "Properties";
+  sub.add_option("--reference-readings", command.reference_readings,
+                 "Readings that the map was not given (as touches.csv): how good are its forecasts?")
+      ->check(CLI::ExistingFile)
+      ->group(properties);
+  sub.add_option("--properties", command.properties, "Property table (YAML), for a map that has none")
+      ->group(properties);
 }
 
 }  // namespace felt::apps

@@ -7,6 +7,7 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/touch_options.h"
+#include "io/atomic_file.h"
 #include "io/friction_log.h"
 #include "io/map_file.h"
 
@@ -16,15 +17,21 @@ namespace {
 using json = nlohmann::ordered_json;
 
 struct FrictionOptions : CommonOptions {
-  std::string log, normal, map, at, plot;
+  std::string log, normal, map, at, plot, touch;
   FrictionSettings settings;
 };
 
 int run_friction(const FrictionOptions& options) {
   FrictionSettings settings = options.settings;
-  if (!options.normal.empty()) settings.normal = point_of(options.normal);
-  if (!options.map.empty())
+  std::string normal_from = "assumed: the z axis";
+  if (!options.normal.empty()) {
+    settings.normal = point_of(options.normal);
+    normal_from = "given";
+  }
+  if (!options.map.empty()) {
     settings.normal = find_contact(load_map(options.map), point_of(options.at), RegionSettings{}).normal;
+    normal_from = "the map's surface at the contact";
+  }
   const ForceLog log = read_force_log(options.log);
   const FrictionReading reading = friction_reading(log, settings);
   if (!options.plot.empty()) write_plot_svg(options.plot, friction_plots(log, reading));
@@ -32,6 +39,8 @@ int run_friction(const FrictionOptions& options) {
   char touch[256];
   snprintf(touch, sizeof touch, "%.6f,%s,friction,%.4f,%.4f", stamp_s,
            options.at.empty() ? "x,y,z" : options.at.c_str(), reading.kinetic_mean, reading.kinetic_sd);
+  const std::string touches = std::string("stamp,x,y,z,property,value,sigma\n") + touch + "\n";
+  if (!options.touch.empty()) write_file_atomically(options.touch, touches);
   if (options.json) {
     const auto time = [&](size_t i) { return log.time_s[std::min(i, log.time_s.size() - 1)]; };
     const json out{{"kinetic", {{"mean", reading.kinetic_mean}, {"sd", reading.kinetic_sd}}},
@@ -39,13 +48,15 @@ int run_friction(const FrictionOptions& options) {
                    {"contact_s", {time(reading.contact_begin), time(reading.contact_end)}},
                    {"sliding_s", {time(reading.slide_begin), time(reading.slide_end)}},
                    {"normal", point_json(settings.normal)},
+                   {"normal_from", normal_from},
                    {"touch", touch}};
     std::printf("%s\n", out.dump(2).c_str());
     return kDone;
   }
-  std::printf("kinetic %.4f +- %.4f, static peak %.4f\n", reading.kinetic_mean, reading.kinetic_sd,
-              reading.static_peak);
-  std::printf("stamp,x,y,z,property,value,sigma\n%s\n", touch);
+  std::printf("kinetic %.4f +- %.4f, static peak %.4f (contact normal %.3f,%.3f,%.3f, %s)\n", reading.kinetic_mean,
+              reading.kinetic_sd, reading.static_peak, settings.normal.x(), settings.normal.y(), settings.normal.z(),
+              normal_from.c_str());
+  std::printf("%s", touches.c_str());
   return kDone;
 }
 
@@ -56,7 +67,7 @@ void add_friction(CLI::App& app) {
   CLI::App& command = add_command(app,
                                   {"friction", "Coefficient of friction from a force-torque log",
                                    "feltmap friction log.csv --normal 0,0,1 --plot log.svg\n"
-                                   "feltmap friction log.csv --map map.vdb --at 0.4,1.2,0.0"},
+                                   "feltmap friction log.csv --map map.vdb --at 0.4,1.2,0.0 --touch touches.csv"},
                                   *options, [options] { return run_friction(*options); });
   command.add_option("log", options->log, "CSV with columns t, fx, fy, fz (seconds, newtons)")->required();
   CLI::Option* normal =
@@ -70,6 +81,8 @@ void add_friction(CLI::App& app) {
   command.add_option("--cutoff", options->settings.cutoff_hz, "Low-pass cut-off, Hz")->capture_default_str();
   command.add_option("--contact-force", options->settings.contact_n, "Normal force of a contact, N")
       ->capture_default_str();
+  command.add_option("--touch", options->touch, "Write the reading as a touches.csv for `feltmap touch --file`")
+      ->needs(at);
   command.add_option("--plot", options->plot, "Write a picture of the log and what was found in it (SVG)");
 }
 

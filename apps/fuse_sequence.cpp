@@ -2,21 +2,41 @@
 
 #include <spdlog/spdlog.h>
 
-#include "mapping/tsdf_integrator.h"
+#include "mapping/ignored_classes.h"
 
 namespace felt::apps {
 
-FusionRecord fuse_sequence(DecodeAhead& frames, Map& map, const IntegrationConfig& config,
-                           const std::function<std::string(const FusionRecord&)>& after_frame) {
-  FusionRecord record;
-  IntegrationScratch scratch;
+namespace {
+
+/// Which unknown ids a frame's images hold, in pixels: looked at only where fusion met one.
+void count_unknown_ids(const Frame& frame, const ClassTable& classes, std::map<uint16_t, uint64_t>& pixels) {
+  const auto count = [&](const auto& ids) {
+    for (const uint16_t id : ids)
+      if (id != kNoLabel && !classes.known(id)) ++pixels[id];
+  };
+  if (frame.probabilities.empty())
+    count(frame.labels);
+  else
+    count(frame.probabilities.class_id);
+}
+
+}  // namespace
+
+void fuse_sequence(DecodeAhead& frames, const FrameSource& source, const IntegrationConfig& config,
+                   const std::vector<uint16_t>& ignored_ids, Map& map, IntegrationScratch& scratch,
+                   FusionRecord& record, const std::function<std::string(const FusionRecord&)>& after_frame) {
   while (std::optional<ReadResult> next = frames.next()) {
     ++record.read;
     if (const auto* skipped = std::get_if<SkippedFrame>(&*next)) {
       ++record.skipped[skipped->reason];
       spdlog::info("frame {} skipped: {}: {}", skipped->index, skipped->reason, skipped->detail);
     } else {
-      const FrameStats stats = integrate(map, std::get<Frame>(*next), config, scratch);
+      Frame& frame = std::get<Frame>(*next);
+      record.ignored_pixels += clear_depth_of(ignored_ids, frame);
+      const FrameStats stats = integrate(map, frame, config, scratch);
+      record.labels += stats.labels;
+      if (stats.labels.unknown > 0) count_unknown_ids(frame, map.classes, record.unknown_ids);
+      record_frame(map.frames, source.recording, source.settings, frame.index);
       ++record.fused;
       record.allocate_s += stats.allocate_s;
       record.fuse_s += stats.fuse_s;
@@ -25,7 +45,6 @@ FusionRecord fuse_sequence(DecodeAhead& frames, Map& map, const IntegrationConfi
     record.stopped = after_frame(record);
     if (!record.stopped.empty()) break;
   }
-  return record;
 }
 
 }  // namespace felt::apps

@@ -1,6 +1,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <fstream>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -15,6 +16,7 @@
 #include "io/fit_priors.h"
 #include "io/infer_json.h"
 #include "io/infer_plot.h"
+#include "io/property_yaml.h"
 
 namespace felt::apps {
 namespace {
@@ -26,15 +28,25 @@ struct InferOptions : CommonOptions {
   std::string simd;
   std::string plot;
   std::string fit_priors;
+  std::string properties_out, property = "friction", unit = "1";
   double max_nu_0 = kDefaultPriorReadings;
 };
 
+int run_fit(const InferOptions& options) {
+  const std::vector<ClassReadings> readings = read_readings_csv(options.fit_priors);
+  if (!options.properties_out.empty()) {
+    const PropertyTable table = fitted_properties(readings, options.property, options.unit, options.max_nu_0);
+    std::ofstream file(options.properties_out);
+    file << properties_yaml(table) << std::flush;
+    if (!file) throw IoError(options.properties_out + ": cannot be written");
+  }
+  std::cout << fit_priors_json(readings, options.max_nu_0) << '\n';
+  return kDone;
+}
+
 int run_infer(const InferOptions& options) {
   if (!options.simd.empty()) choose_simd(options.simd, "--simd");
-  if (!options.fit_priors.empty()) {
-    std::cout << fit_priors_json(read_readings_csv(options.fit_priors), options.max_nu_0) << '\n';
-    return kDone;
-  }
+  if (!options.fit_priors.empty()) return run_fit(options);
   std::ios::sync_with_stdio(false);
   size_t number = 0, faulty = 0;
   std::vector<Plot> panels;
@@ -65,7 +77,7 @@ void add_infer(CLI::App& app) {
       *options, [options] { return run_infer(*options); });
   command
       .add_option("--precision", options->precision,
-                  "f64: numbers as given; f32: rounded to the single precision of a map")
+                  "f64: the functions that specify the models; f32: the batch kernels that a map runs")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, InferPrecision>{{"f64", InferPrecision::f64}, {"f32", InferPrecision::f32}}))
       ->default_str("f64");
@@ -73,6 +85,11 @@ void add_infer(CLI::App& app) {
                      "Write an SVG with the density of the next reading before and after each of the first 20 lines");
   command.add_option("--fit-priors", options->fit_priors,
                      "Instead: fit priors to the readings of a CSV (class, group, value) and print them as JSON");
+  command.add_option("--properties-out", options->properties_out,
+                     "With --fit-priors: write the priors to this properties.yaml too");
+  command.add_option("--property", options->property, "Name of the property in --properties-out")
+      ->capture_default_str();
+  command.add_option("--unit", options->unit, "Unit of the property in --properties-out")->capture_default_str();
   command.add_option("--max-nu", options->max_nu_0, "Most readings that a fitted prior may stand for")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

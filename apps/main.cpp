@@ -24,11 +24,13 @@ void add_commands(CLI::App& app) {
   app.require_subcommand(1);
   app.set_version_flag("--version", [] { return "feltmap " FELTMAP_VERSION " (SIMD: " + simd_name() + ")"; });
   add_reconstruct(app);
+  add_segment(app);
   add_info(app);
   add_export(app);
   add_simulate(app);
   add_render(app);
   add_evaluate(app);
+  add_calibrate_labels(app);
   add_touch(app);
   add_region(app);
   add_query(app);

@@ -74,14 +74,7 @@ int run_query(const QueryOptions& options) {
       std::printf(", %s %.3f, entropy %.3f", a["class"].get<std::string>().c_str(),
                   a["class_probability"][a["class"].get<std::string>()].get<double>(),
                   a["class_entropy"].get<double>());
-    for (const auto& [name, p] : a["properties"].items()) {
-      if (p["mean"].is_null()) continue;
-      std::printf(", %s %.3f", name.c_str(), p["mean"].get<double>());
-      if (!p["sd"].is_null()) std::printf(" +- %.3f", p["sd"].get<double>());
-      if (p.contains("below"))
-        std::printf(", P(<= %g) %.3f", p["below"]["threshold"].get<double>(), p["below"]["probability"].get<double>());
-    }
-    std::printf("\n");
+    std::printf("\n%s", property_text(a).c_str());
   }
   return kDone;
 }

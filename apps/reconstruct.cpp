@@ -1,29 +1,35 @@
+#include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 
 #include <chrono>
 #include <cstdio>
 #include <exception>
+#include <functional>
 #include <future>
 #include <nlohmann/json.hpp>
+#include <utility>
 
+#include "apps/checkpoint.h"
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/fuse_sequence.h"
 #include "apps/interrupt.h"
+#include "apps/label_options.h"
 #include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/reconstruct_options.h"
+#include "apps/recorded_touches.h"
 #include "core/error.h"
 #include "core/simd.h"
 #include "io/atomic_file.h"
 #include "io/decode_ahead.h"
-#include "io/map_file.h"
 #include "io/mesh_io.h"
 #include "io/open_sequence.h"
 #include "io/system_memory.h"
 #include "mapping/marching_cubes.h"
 #include "mapping/size_estimate.h"
+#include "mapping/touch_update.h"
 
 namespace felt::apps {
 namespace {
@@ -77,20 +83,42 @@ bool memory_runs_out(const Map& map) {
   return double(available_memory_bytes()) < estimated_bytes(double(map.store.size()), resolution) - held + 64e6;
 }
 
-FusionRecord fuse(const SequenceReader& sequence, Map& map, const ReconstructOptions& options,
-                  const CommonOptions& common, const InterruptGuard& interrupt) {
+/// Saves the map on the way. What cannot be written now may be later: the run goes on, and the last one stays.
+void try_checkpoint(const std::function<void()>& save, int64_t frames) {
+  try {
+    save();
+    spdlog::info("checkpoint after {} frames", frames);
+  } catch (const IoError& fault) {
+    spdlog::warn("no checkpoint: {}", fault.what());
+  }
+}
+
+/// Fuses what the record has not read yet.
+void fuse(const SequenceReader& sequence, const FrameSource& source, const PerceptionTimes& perception,
+          const ReconstructOptions& options, const std::vector<uint16_t>& ignored_ids, const CommonOptions& common,
+          const InterruptGuard& interrupt, const std::function<void()>& save, Map& map, IntegrationScratch& scratch,
+          FusionRecord& record) {
   ProgressBar progress("frames", sequence.size(), !common.quiet);
-  DecodeAhead frames(sequence, {.threads = common.thread_count()});
-  FusionRecord record = fuse_sequence(frames, map, options.fusion, [&](const FusionRecord& so_far) -> std::string {
-    progress.update(so_far.read);
-    if (interrupt.requested()) return "interrupted";
-    constexpr int64_t kMemoryCheckEvery = 32;
-    if (so_far.read % kMemoryCheckEvery == 0 && memory_runs_out(map)) return "out of memory";
-    return {};
-  });
-  record.decode_s = frames.decode_s();
+  DecodeAhead frames(sequence, {.threads = common.thread_count(), .first = record.read});
+  const auto decode_s = [&] { return frames.decode_s() - perception.network_s() - perception.vote_s(); };
+  fuse_sequence(frames, source, options.fusion, ignored_ids, map, scratch, record,
+                [&](const FusionRecord& so_far) -> std::string {
+                  progress.update(so_far.read, shares_text({{"network", perception.network_s()},
+                                                            {"vote", perception.vote_s()},
+                                                            {"decode", decode_s()},
+                                                            {"fuse", so_far.allocate_s + so_far.fuse_s}}));
+                  if (interrupt.requested()) return "interrupted";
+                  constexpr int64_t kMemoryCheckEvery = 32;
+                  if (so_far.read % kMemoryCheckEvery == 0 && memory_runs_out(map)) return "out of memory";
+                  if (options.checkpoint_every > 0 && so_far.read % options.checkpoint_every == 0 &&
+                      so_far.read < sequence.size())
+                    try_checkpoint(save, so_far.read);
+                  return {};
+                });
+  record.network_s = perception.network_s();
+  record.vote_s = perception.vote_s();
+  record.decode_s = decode_s();
   record.wait_s = frames.wait_s();
-  return record;
 }
 
 /// "3 frames: 2 missing pose, 1 truncated depth image".
@@ -105,10 +133,11 @@ std::string nothing_fused(const FusionRecord& record) {
 }
 
 /// Map file and mesh, side by side. The map is what cannot be made again: a mesh that fails does not stop its saving.
-void write_results(const Map& map, const fs::path& folder, int threads, ReconstructReport& report) {
+void write_results(const Map& map, const std::function<void()>& save, const fs::path& folder, int threads,
+                   ReconstructReport& report) {
   auto saving = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&] {
     const auto start = Clock::now();
-    save_map(map, folder / kMapName);
+    save();
     report.save_s = seconds_since(start);
   });
   std::exception_ptr mesh_failure;
@@ -132,53 +161,106 @@ void print_summary(const ReconstructReport& report, const fs::path& folder) {
   std::printf("%lld of %lld frames fused in %.2f s: %zu blocks, %zu voxels; mesh of %zu triangles\n",
               static_cast<long long>(fusion.fused), static_cast<long long>(fusion.read), report.total_s, report.blocks,
               report.active_voxels, report.mesh_triangles);
+  if (fusion.network_s + fusion.vote_s > 0)
+    std::printf("  thread time: %s\n", shares_text({{"network", fusion.network_s},
+                                                    {"vote", fusion.vote_s},
+                                                    {"decode", fusion.decode_s},
+                                                    {"fuse", fusion.allocate_s + fusion.fuse_s},
+                                                    {"mesh and save", report.mesh_s + report.save_s}})
+                                           .c_str());
   for (const auto& [reason, count] : fusion.skipped)
     std::printf("  skipped %lld: %s\n", static_cast<long long>(count), reason.c_str());
+  if (!fusion.unknown_ids.empty()) {
+    std::string ids;
+    for (const auto& [id, pixels] : fusion.unknown_ids) ids += (ids.empty() ? "" : ", ") + std::to_string(id);
+    std::printf("  labels that the class table does not know, not fused: %s\n", ids.c_str());
+  }
+  if (fusion.labels.invalid > 0)
+    std::printf("  %llu observations of probabilities that are no distribution, not fused\n",
+                static_cast<unsigned long long>(fusion.labels.invalid));
   for (const char* name : {kMapName, kMeshName, kReportName}) std::printf("  %s\n", (folder / name).c_str());
 }
 
 int run(const ReconstructArguments& arguments, CommonOptions common) {
   const auto start = Clock::now();
-  const ReconstructOptions options = resolve(arguments, common.threads);
+  ReconstructOptions options = resolve(arguments, common.threads);
   common.threads = options.threads;
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(common.thread_count()));
-  const auto sequence = open_sequence(options.sequence, options.reading);
-  prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite);
+  auto sequence = open_sequence(options.sequence, options.reading);
+  const Perception perception = perception_of(options.perception, sequence->info().classes);
+  const PreparedClasses classes = prepare_classes(options.labels, perception.classes(sequence->info()));
+  const TouchPlan touches = plan_touches(options, *sequence, classes.table);
+  prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite || options.resume);
   check_memory(*sequence, options);
+  sequence = perceived_sequence(std::move(sequence), perception);
 
+  const nlohmann::ordered_json config = to_json(options);
+  const FrameSource source{sequence->info().fingerprint, fusion_settings(config)};
   ReconstructReport report;
   Map map(options.voxel_size_m, options.truncation_m);
-  map.classes = sequence->info().classes;
+  map.classes = classes.table;
+  map.properties = touches.properties;
+  options.fusion.labels.likelihood = classes.likelihood.get();
+  IntegrationScratch scratch;
+  bool complete = false;
+  if (options.resume)
+    if (auto earlier = resume(options.out / kMapName, source.recording, config)) {
+      map = std::move(earlier->map);
+      report.fusion = std::move(earlier->record);
+      scratch.viewpoints.set_seen(std::move(earlier->viewpoints));
+      report.resumed_after = report.fusion.read;
+      complete = earlier->complete;
+    }
+  const auto save = [&] {
+    save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, source.recording, config,
+                    options.out / kMapName);
+  };
   const InterruptGuard interrupt;
-  report.fusion = fuse(*sequence, map, options, common, interrupt);
+  fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save, map, scratch,
+       report.fusion);
   if (report.fusion.fused == 0 && report.fusion.stopped.empty())
     throw FormatError(describe_mismatch(options.sequence.string(), "frames", "at least one that can be fused",
                                         nothing_fused(report.fusion)));
 
-  const nlohmann::ordered_json config = to_json(options);
-  map.metadata["config"] = config.dump();
-  write_results(map, options.out, common.thread_count(), report);
+  // An interrupted run may go on: its touches come with its last frame.
+  std::vector<TouchOutcome> touched;
+  if (report.fusion.stopped.empty() && !complete) {
+    const auto start_touch = Clock::now();
+    touched = apply_touches(map, touches);
+    report.touch_s = seconds_since(start_touch);
+    complete = true;
+  }
+  write_results(map, save, options.out, common.thread_count(), report);
   report.voxel_size_m = options.voxel_size_m, report.truncation_m = options.truncation_m;
   report.blocks = map.store.size();
   report.active_voxels = active_voxel_count(map);
   report.tsdf_bytes = map.store.geometry_bytes(), report.color_bytes = map.store.color_bytes();
-  report.class_bytes = map.store.plane_bytes();
+  report.property_bytes = touch_plane_bytes(map) + journal_bytes(map.touches);
+  report.classes = map.classes.size();
+  report.class_bytes = class_bytes(map);
+  report.instance_bytes = map.store.instance_bytes();
   report.threads = common.thread_count();
   report.simd = simd_name();
   report.peak_rss_bytes = peak_resident_bytes();
   report.total_s = seconds_since(start);
-  const std::string json = to_json(report, config).dump(2) + "\n";
+  nlohmann::ordered_json document = to_json(report, config);
+  if (!touches.file.empty()) document["touches"] = touches_json(touches, touched);
+  const std::string json = document.dump(2) + "\n";
   write_file_atomically(options.out / kReportName, json);
 
   if (common.json) {
     std::fputs(json.c_str(), stdout);
   } else if (!common.quiet) {
     print_summary(report, options.out);
+    if (!touched.empty()) std::printf("  %zu touches recorded with the sequence\n", touched.size());
   }
+  print_refused(touches, touched);
   const FusionRecord& fusion = report.fusion;
   if (fusion.stopped.empty()) return kDone;
-  std::fprintf(stderr, "feltmap: %s after %lld of %lld frames: what was fused is saved in %s\n", fusion.stopped.c_str(),
-               static_cast<long long>(fusion.read), static_cast<long long>(sequence->size()), options.out.c_str());
+  std::fprintf(stderr,
+               "feltmap: %s after %lld of %lld frames: what was fused is saved in %s; --resume goes on from there\n",
+               fusion.stopped.c_str(), static_cast<long long>(fusion.read), static_cast<long long>(sequence->size()),
+               options.out.c_str());
   return kInterrupted;
 }
 
@@ -190,7 +272,9 @@ void add_reconstruct(CLI::App& app) {
   CLI::App& command = add_command(app,
                                   {"reconstruct", "Fuse a recorded RGB-D sequence into a map, a mesh and a report",
                                    "feltmap reconstruct recording --out result --voxel-size 0.02\n"
-                                   "feltmap reconstruct rgbd_dataset_freiburg1_rpy --out result --frames 0:200:2"},
+                                   "feltmap reconstruct rgbd_dataset_freiburg1_rpy --out result --frames 0:200:2\n"
+                                   "feltmap reconstruct recording --out result --segmenter net.yaml\n"
+                                   "feltmap reconstruct recording --out result --checkpoint 100 --resume"},
                                   *common, [arguments, common] { return run(*arguments, *common); });
   add_reconstruct_options(command, *arguments);
 }

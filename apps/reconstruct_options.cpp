@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "apps/label_options.h"
 #include "core/error.h"
 #include "io/reconstruct_config.h"
 
@@ -51,6 +52,7 @@ public:
               const std::string& found) {
     if (!good) messages_.push_back(describe_mismatch(where, what, expected, found));
   }
+  void add(const std::string& message) { messages_.push_back(message); }
   void throw_if_any() const {
     if (!messages_.empty()) throw ConfigError(messages_);
   }
@@ -67,6 +69,13 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
   command.add_option("SEQUENCE", a.sequence, "Folder of a recorded RGB-D sequence, or a .sens file")->required();
   command.add_option("--out", a.out, "Folder for map.vdb, mesh.ply and report.json")->required();
   command.add_flag("--force", a.overwrite, "Replace results that exist there, each when the new one is whole");
+  command
+      .add_option("--checkpoint", a.checkpoint_every,
+                  "Save the map every so many frames, so that no accident loses more than those; 0: at the end only")
+      ->check(CLI::NonNegativeNumber)
+      ->option_text("N");
+  command.add_flag("--resume", a.resume,
+                   "Go on with the map in --out, however its run ended; the result is that of a run that never ended");
   command.add_option("--config", a.config, "YAML file with any of these settings; the command line wins")
       ->option_text("FILE");
 
@@ -97,9 +106,17 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
       ->group(reading);
   command.add_option("--max-dt", a.max_dt_s, "Largest difference of stamps within a frame, seconds")->group(reading);
   command.add_option("--labels", a.labels, "Folder of label images")->group(reading);
-  command.add_option("--probs", a.probs, "Folder of class probability images")->group(reading);
-  command.add_option("--classes", a.classes, "Class table (classes.yaml)")->group(reading);
+  command
+      .add_option("--probs", a.probs,
+                  "Folder of class probability images (docs/semantics.md), or of confidences beside --labels")
+      ->group(reading);
+  command.add_option("--classes", a.classes, "Class table (classes.yaml, or a CSV of id and name)")->group(reading);
+  command.add_option("--properties", a.properties, "Property table (properties.yaml)")->group(reading);
+  command.add_option("--touches", a.touches, "Recorded touches (touches.csv), each at its stamp or frame")
+      ->group(reading);
+  add_label_options(command, a.label_settings);
   command.add_flag("--no-color", a.no_color, "Do not read colour images")->group(reading);
+  a.perception.add_to(command, "Perception", "--segmenter");
 }
 
 ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
@@ -108,12 +125,15 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   ReconstructConfig file;
   if (!a.config.empty()) problems.attempt([&] { file = read_reconstruct_config(a.config); });
   options.sequence = a.sequence, options.out = a.out, options.overwrite = a.overwrite;
+  options.checkpoint_every = a.checkpoint_every, options.resume = a.resume;
   options.threads = threads > 0 ? threads : file.threads.value_or(0);
 
   SequenceOptions& reading = options.reading;
   reading.format = a.format.empty() ? file.format.value_or("") : a.format;
   reading.labels_dir = a.labels.empty() ? file.labels : a.labels;
   reading.probs_dir = a.probs.empty() ? file.probs : a.probs;
+  options.properties = a.properties.empty() ? file.properties : a.properties;
+  options.touches = a.touches.empty() ? file.touches : a.touches;
   reading.classes_file = a.classes.empty() ? file.classes : a.classes;
   reading.intrinsics = file.intrinsics;
   reading.pose_convention = file.pose_convention;
@@ -134,6 +154,11 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
     problems.expect(positive(*reading.depth_scale), "--depth-scale", "depth units per metre", "a number above 0",
                     text_of(*reading.depth_scale));
   problems.expect(positive(reading.max_dt_s), "--max-dt", "seconds", "a number above 0", text_of(reading.max_dt_s));
+
+  options.perception = a.perception;
+  reading.instances_dir = a.perception.instances;
+  if (!a.perception.net.empty())
+    problems.expect(reading.read_color, "--segmenter", "colour", "colour images to look at", "--no-color");
 
   options.voxel_size_m = a.voxel_size_m.value_or(file.voxel_size_m.value_or(options.voxel_size_m));
   problems.expect(positive(options.voxel_size_m), "--voxel-size", "edge of a voxel in metres", "a number above 0",
@@ -163,6 +188,10 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
                   "a number above the smallest depth, " + text_of(fusion.min_depth_m), text_of(fusion.max_depth_m));
   problems.expect(fusion.max_weight >= 1, "--max-weight", "summed weight", "a number of at least 1",
                   text_of(fusion.max_weight));
+  options.labels = overlaid(a.label_settings, file.label_settings);
+  for (const std::string& problem : problems_of(options.labels)) problems.add(problem);
+  fusion.labels = label_config(options.labels);
+  reading.read_instances = fusion.labels.instances || a.perception.vote == SegmentSource::instances;
   problems.throw_if_any();
   return options;
 }
@@ -185,8 +214,11 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   if (!reading.labels_dir.empty()) json["labels"] = reading.labels_dir.string();
   if (!reading.probs_dir.empty()) json["probs"] = reading.probs_dir.string();
   if (!reading.classes_file.empty()) json["classes"] = reading.classes_file.string();
+  if (!options.properties.empty()) json["properties"] = options.properties.string();
+  if (!options.touches.empty()) json["touches"] = options.touches.string();
   json["max_dt_s"] = reading.max_dt_s;
   json["color"] = reading.read_color;
+  if (options.perception.asked()) json["perception"] = to_json(options.perception);
   json["voxel_size_m"] = options.voxel_size_m;
   json["truncation_m"] = options.truncation_m;
   json["min_depth_m"] = short_decimal(fusion.min_depth_m);
@@ -196,6 +228,7 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   json["max_weight"] = short_decimal(fusion.max_weight);
   json["dropoff_start_vox"] = short_decimal(fusion.dropoff_start_vox);
   json["carve"] = fusion.carve;
+  add_to_json(options.labels, fusion.labels, json);
   return json;
 }
 

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "mapping/label_fusion.h"
+
 namespace felt::apps {
 
 /// What fusing a sequence did, gathered frame by frame.
@@ -14,10 +16,15 @@ struct FusionRecord {
   int64_t fused = 0;
   std::map<std::string, int64_t> skipped;  ///< by reason
   double decode_s = 0;                     ///< summed over decoding threads
+  double network_s = 0;                    ///< the same, in the segmenter
+  double vote_s = 0;                       ///< the same, in segments and voting
   double wait_s = 0;                       ///< that fusion waited for a decoded frame
   double allocate_s = 0, fuse_s = 0;
-  std::vector<double> frame_ms;  ///< of each fused frame: allocation and update of all channels
-  std::string stopped;           ///< why fusion ended before the last frame; empty: it did not
+  std::vector<double> frame_ms;              ///< of each fused frame: allocation and update of all channels
+  LabelStats labels;                         ///< summed over frames
+  std::map<uint16_t, uint64_t> unknown_ids;  ///< label ids that the class table does not know, with their pixels
+  uint64_t ignored_pixels = 0;               ///< of --ignore-classes
+  std::string stopped;                       ///< why fusion ended before the last frame; empty: it did not
 };
 
 /// Everything that `report.json` of reconstruct says.
@@ -25,12 +32,14 @@ struct ReconstructReport {
   FusionRecord fusion;
   double voxel_size_m = 0, truncation_m = 0;
   size_t blocks = 0, active_voxels = 0;
-  size_t tsdf_bytes = 0, color_bytes = 0, class_bytes = 0, property_bytes = 0;
+  size_t tsdf_bytes = 0, color_bytes = 0, class_bytes = 0, instance_bytes = 0, property_bytes = 0;
+  int classes = 0;  ///< of the table, without the ignored ones
   size_t peak_rss_bytes = 0;
-  double mesh_s = 0, save_s = 0, total_s = 0;
+  double touch_s = 0, mesh_s = 0, save_s = 0, total_s = 0;
   int threads = 1;
   std::string simd;
   std::string map_hash;
+  int64_t resumed_after = 0;  ///< frames that an earlier run had read
   size_t mesh_vertices = 0, mesh_triangles = 0;
 };
 

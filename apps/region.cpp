@@ -49,7 +49,8 @@ int run_region(const RegionCommandOptions& options) {
   for (int c = 0; c < map.classes.size(); ++c)
     if (summary.class_voxels[size_t(c)] > 0)
       std::printf("  %s: %zu voxels\n", map.classes.at_slot(c).name.c_str(), summary.class_voxels[size_t(c)]);
-  std::printf("  believed: %s\n", belief_text(map, belief).c_str());
+  std::printf("  believed: %s\n%s", belief_text(map, belief).c_str(),
+              property_text(belief_json(map, belief, options.below)).c_str());
   for (const std::string& warning : summary.warnings) std::printf("  warning: %s\n", warning.c_str());
   return kDone;
 }

@@ -1,11 +1,14 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "apps/camera_options.h"
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/touch_options.h"
 #include "core/error.h"
 #include "io/map_file.h"
 #include "io/picture.h"
@@ -21,24 +24,14 @@ namespace fs = std::filesystem;
 struct RenderCommand {
   CommonOptions common;
   CameraOptions camera;
-  std::string map, out, trajectory, overview, up = "0,0,1";
+  std::string map, out, trajectory, overview, properties, up = "0,0,1";
   std::vector<std::string> poses;
   std::vector<std::string> images = {"depth", "normal", "color"};
-  RenderOptions options;
+  bool colored = false;
+  ViewOptions options;
 };
 
-constexpr const char* kImages[] = {"depth", "normal", "color", "class", "entropy"};
-
-ColorImage normal_picture(const Image<Eigen::Vector3f>& normals) {
-  ColorImage picture(normals.width(), normals.height(), {0, 0, 0, 255});
-  for (size_t i = 0; i < normals.size(); ++i) {
-    const Eigen::Vector3f& n = normals.data()[i];
-    if (n.isZero()) continue;
-    const Eigen::Vector3f level = (n + Eigen::Vector3f::Ones()) * 127.5f + Eigen::Vector3f::Constant(0.5f);
-    picture.data()[i] = {uint8_t(level.x()), uint8_t(level.y()), uint8_t(level.z()), 255};
-  }
-  return picture;
-}
+const std::vector<std::string> kImages = {"depth", "normal", "color", "class", "entropy"};
 
 Eigen::Vector3d parse_up(const std::string& text) {
   Eigen::Vector3d up;
@@ -49,21 +42,69 @@ Eigen::Vector3d parse_up(const std::string& text) {
   return up;
 }
 
+/// A property's mean or sd, asked for as "friction.mean".
+struct PropertyImage {
+  int property = 0;
+  bool sd = false;
+  double low = 0, high = 1;  ///< range of its levels: of all classes' priors
+};
+
+std::optional<PropertyImage> property_image_of(const Map& map, const std::string& name) {
+  const size_t dot = name.rfind('.');
+  if (dot == std::string::npos) return std::nullopt;
+  const std::string what = name.substr(dot + 1);
+  const auto property = map.properties.index_of(name.substr(0, dot));
+  if (!property || (what != "mean" && what != "sd")) return std::nullopt;
+  PropertyImage image{*property, what == "sd", std::numeric_limits<double>::infinity(), 0};
+  if (!image.sd) image.high = -image.low;
+  for (const auto& [class_name, prior] : map.properties[*property].priors) {
+    // Means of mixtures lie between the classes'; readings may move them a little beyond.
+    image.low = std::min(image.low, image.sd ? 0 : prior.mean - prior.sd);
+    image.high = std::max(image.high, image.sd ? 3 * prior.sd : prior.mean + prior.sd);
+  }
+  return image;
+}
+
+/// Everything that the images of a view are made from.
+struct Source {
+  const Map& map;
+  RayCaster caster;
+  VoxelBeliefs beliefs;
+};
+
 /// Writes the images of one pose and returns their names.
-std::vector<std::string> write_view(const RenderCommand& command, const Map& map, const RenderedView& view,
-                                    size_t number) {
+nlohmann::ordered_json write_view(const RenderCommand& command, const Source& source, const RenderedView& view,
+                                  size_t number) {
   char stem[32];
   std::snprintf(stem, sizeof stem, "%06zu", number);
-  std::vector<std::string> names;
+  nlohmann::ordered_json names = nlohmann::ordered_json::array();
   for (const std::string& image : command.images) {
-    const std::string name = std::string(stem) + "." + image + ".png";
-    const fs::path path = fs::path(command.out) / name;
-    if (image == "depth") write_depth_png(path, view.depth_m);
-    if (image == "normal") write_png(path, normal_picture(view.normal));
-    if (image == "color") write_png(path, view.color);
-    if (image == "class") write_label_png(path, class_image(map, view.voxel));
-    if (image == "entropy") write_depth_png(path, entropy_image(map, view.voxel));
-    names.push_back(name);
+    const auto path_of = [&](const char* extension) {
+      names.push_back(std::string(stem) + "." + image + extension);
+      return fs::path(command.out) / names.back().get<std::string>();
+    };
+    const auto write_values = [&](const Image<float>& values, double low, double high) {
+      write_level_png(path_of(".png"), values, low, high);
+      if (command.colored) write_png(path_of(".color.png"), felt::colored(values, low, high));
+    };
+    if (image == "depth") write_depth_png(path_of(".png"), view.depth_m);
+    if (image == "normal") write_png(path_of(".png"), felt::colored(view.normal));
+    if (image == "color") write_png(path_of(".png"), view.color);
+    if (image == "class") {
+      const LabelImage labels = class_image(source.map, source.beliefs, view.voxel);
+      write_label_png(path_of(".png"), labels);
+      if (command.colored) write_png(path_of(".color.png"), felt::colored(labels, source.map.classes));
+    }
+    if (image == "entropy") {
+      const Image<float> entropy = entropy_image(source.beliefs, view.voxel);
+      write_depth_png(path_of(".png"), entropy);
+      if (command.colored)
+        write_png(path_of(".color.png"), felt::colored(entropy, 0, std::log(double(source.map.classes.size()))));
+    }
+    if (const auto property = property_image_of(source.map, image)) {
+      const PropertyImages values = property_images(source.beliefs, view.voxel, property->property);
+      write_values(property->sd ? values.sd : values.mean, property->low, property->high);
+    }
   }
   return names;
 }
@@ -80,28 +121,41 @@ int render(const RenderCommand& command) {
         describe_mismatch("render", "what to render", "--pose, --trajectory or --overview", "none of them"));
   if (!poses.empty() && command.out.empty())
     problems.push_back(describe_mismatch("render", "where to write", "--out DIR", "nothing"));
-  const bool classes = std::any_of(command.images.begin(), command.images.end(),
-                                   [](const std::string& image) { return image == "class" || image == "entropy"; });
-  const Map map = load_map(command.map);
-  if (classes && map.classes.empty())
-    problems.push_back(describe_mismatch(command.map, "--images class, entropy", "a map with classes", "none"));
+  Map map = load_map(command.map);
+  use_properties(map, command.properties);
+  nlohmann::ordered_json levels = nlohmann::ordered_json::object();
+  for (const std::string& image : command.images) {
+    const bool of_classes = image == "class" || image == "entropy";
+    const auto property = property_image_of(map, image);
+    if (of_classes && map.classes.empty())
+      problems.push_back(describe_mismatch(command.map, "--images class, entropy", "a map with classes", "none"));
+    if (property) levels[image] = {{"1", property->low}, {"65535", property->high}};
+    if (!property && std::find(kImages.begin(), kImages.end(), image) == kImages.end()) {
+      std::string known = "depth, normal, color, class, entropy";
+      for (const Property& p : map.properties.properties()) known += ", " + p.name + ".mean, " + p.name + ".sd";
+      problems.push_back(describe_mismatch("--images", "image", "one of " + known, "'" + image + "'"));
+    }
+  }
   if (!problems.empty()) throw ConfigError(problems);
 
   nlohmann::ordered_json json = {{"map", command.map}, {"views", nlohmann::ordered_json::array()}};
+  if (!levels.empty()) json["levels"] = levels;
   if (!command.overview.empty()) {
     write_png(command.overview, overview_picture(extract_mesh(map), parse_up(command.up)));
     json["overview"] = command.overview;
   }
   if (!poses.empty()) {
     fs::create_directories(command.out);
-    const RayCaster caster(map);
+    const Source source{map, RayCaster(map), VoxelBeliefs(map)};
     for (size_t i = 0; i < poses.size(); ++i)
-      json["views"].push_back(write_view(command, map, caster.render(camera, poses[i], command.options), i));
+      json["views"].push_back(write_view(command, source, source.caster.render(camera, poses[i], command.options), i));
   }
-  if (command.common.json)
+  if (command.common.json) {
     std::printf("%s\n", json.dump(2).c_str());
-  else if (!command.common.quiet)
-    std::printf("%zu views of %s\n", poses.size(), command.map.c_str());
+  } else if (!command.common.quiet) {
+    if (!poses.empty()) std::printf("%zu views of %s in %s\n", poses.size(), command.map.c_str(), command.out.c_str());
+    if (!command.overview.empty()) std::printf("overview of %s in %s\n", command.map.c_str(), command.overview.c_str());
+  }
   return kDone;
 }
 
@@ -109,13 +163,14 @@ int render(const RenderCommand& command) {
 
 void add_render(CLI::App& app) {
   static RenderCommand command;
-  CLI::App& sub =
-      add_command(app,
-                  {"render", "Depth, normal, colour, class and entropy images of a map from any pose, ray-cast",
-                   "feltmap render out/map.vdb --trajectory poses.txt --out views\n"
-                   "feltmap render out/map.vdb --pose 0,0,1.5,0.5,-0.5,0.5,-0.5 --images depth,color --out views\n"
-                   "feltmap render out/map.vdb --overview picture.png --up 0,0,1"},
-                  command.common, [] { return render(command); });
+  CLI::App& sub = add_command(
+      app,
+      {"render", "Depth, normal, colour, class, entropy and property images of a map from any pose, ray-cast",
+       "feltmap render out/map.vdb --trajectory poses.txt --out views\n"
+       "feltmap render out/map.vdb --pose 0,0,1.5,0.5,-0.5,0.5,-0.5 --images depth,color --out views\n"
+       "feltmap render out/map.vdb --trajectory poses.txt --images class,friction.mean --colored --out views\n"
+       "feltmap render out/map.vdb --overview picture.png --up 0,0,1"},
+      command.common, [] { return render(command); });
   sub.add_option("MAP", command.map, "Map file")->required()->check(CLI::ExistingFile);
   sub.add_option("--pose", command.poses,
                  "Camera-to-world pose: tx,ty,tz,qx,qy,qz,qw or 12 or 16 numbers of a matrix (repeatable)")
@@ -124,12 +179,17 @@ void add_render(CLI::App& app) {
       ->check(CLI::ExistingFile);
   sub.add_option("--out", command.out,
                  "Folder for the images: <number>.<image>.png; depth in millimetres, entropy in "
-                 "thousandths of a nat, classes as ids, 16 bit each");
-  sub.add_option("--images", command.images, "Which images")
+                 "thousandths of a nat, classes as ids, properties from 1 to 65535 between the ends that --json "
+                 "tells, 16 bit each");
+  sub.add_option(
+         "--images", command.images,
+         "Which images: depth, normal, color, class, entropy, and PROPERTY.mean or PROPERTY.sd of each property")
       ->delimiter(',')
       ->allow_extra_args(false)
-      ->check(CLI::IsMember(std::vector<std::string>(std::begin(kImages), std::end(kImages))))
       ->capture_default_str();
+  sub.add_flag("--colored", command.colored,
+               "Also write class, entropy and property images in colour, to look at: <number>.<image>.color.png");
+  sub.add_option("--properties", command.properties, "Property table (YAML), for a map that has none");
   add_camera_options(sub, command.camera);
   sub.add_option("--max-depth", command.options.max_depth_m, "Metres along the optical axis")
       ->check(CLI::PositiveNumber)

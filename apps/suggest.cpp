@@ -16,7 +16,7 @@ namespace {
 using json = nlohmann::ordered_json;
 
 struct SuggestOptions : CommonOptions {
-  std::string map, property, properties;
+  std::string map, property, properties, rule = "connected";
   SuggestionSettings settings;
 };
 
@@ -46,7 +46,9 @@ json suggestion_json(const Map& map, const Suggestion& s) {
 int run_suggest(const SuggestOptions& options) {
   Map map = load_map(options.map);
   use_properties(map, options.properties);
-  const std::vector<Suggestion> suggestions = suggest_touches(map, options.property, options.settings);
+  SuggestionSettings settings = options.settings;
+  settings.region.rule = rule_of_name(options.rule);
+  const std::vector<Suggestion> suggestions = suggest_touches(map, options.property, settings);
   json all = json::array();
   for (const Suggestion& s : suggestions) all.push_back(suggestion_json(map, s));
   if (options.json) {
@@ -76,6 +78,9 @@ void add_suggest(CLI::App& app) {
   command.add_option("--property", options->property, "What would be measured")->required();
   command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
   command.add_option("--top", options->settings.most, "How many segments to name")->check(CLI::PositiveNumber);
+  command.add_option("--region", options->rule, "connected: what a touch would update; segment: the map's segments")
+      ->check(CLI::IsMember({"connected", "segment"}))
+      ->capture_default_str();
   command.add_option("--min-voxels", options->settings.min_voxels, "Smallest segment")->capture_default_str();
 }
 

@@ -10,7 +10,10 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/touch_options.h"
+#include "inference/decision.h"
 #include "io/map_file.h"
+#include "io/open_sequence.h"
+#include "io/touch_json.h"
 #include "io/touches.h"
 
 namespace felt::apps {
@@ -21,9 +24,43 @@ using json = nlohmann::ordered_json;
 struct TouchOptions : CommonOptions {
   std::string map, at, property, file, out, undo, redo, properties, model = "material", projection = "kl";
   double value = 0, sigma = 0, rho = std::numeric_limits<double>::quiet_NaN(), stamp_s = 0;
-  bool dry_run = false;
+  bool dry_run = false, list = false;
   RegionOptions region;
+  // A touch given by a frame of the sequence and a pixel.
+  std::string sequence, masks;
+  std::optional<int64_t> frame;
+  std::vector<double> pixel;
 };
+
+/// The sequence that touches name frames of.
+struct OpenedSequence {
+  std::unique_ptr<SequenceReader> reader;
+  TouchedSequence touched;
+};
+
+std::optional<OpenedSequence> open_touched(const TouchOptions& options) {
+  if (options.sequence.empty()) return std::nullopt;
+  SequenceOptions reading;
+  reading.instances_dir = options.masks;
+  OpenedSequence opened{open_sequence(options.sequence, reading), {}};
+  opened.touched = touched_sequence(*opened.reader);
+  opened.touched.segments = options.masks.empty() ? SegmentSource::geometric : SegmentSource::instances;
+  return opened;
+}
+
+/// The rows of the file, or the one touch that the command line gives by frame and pixel.
+std::vector<RecordedTouch> recorded_touches(const TouchOptions& options) {
+  if (!options.file.empty()) return read_touches(options.file);
+  if (options.sequence.empty() || options.pixel.size() != 2)
+    throw TouchError("touch: expected --sequence and --pixel with --frame, found not all of them");
+  RecordedTouch touch;
+  touch.frame = options.frame;
+  touch.pixel = Eigen::Vector2d(options.pixel[0], options.pixel[1]);
+  touch.property = options.property;
+  touch.value = options.value;
+  touch.sigma = options.sigma;
+  return {touch};
+}
 
 json effect_json(const Map& map, const TouchEffect& effect, const RegionSettings& settings) {
   const Touch& touch = *map.touches.find(effect.id);
@@ -73,6 +110,37 @@ void print_effect(const Map& map, const TouchEffect& effect, const RegionSetting
   }
 }
 
+/// The journal, for people and (without region masks) for programs.
+int list_touches(const TouchOptions& options) {
+  const Map map = load_map(options.map);
+  if (options.json) {
+    json out;
+    out["map"] = options.map;
+    out["touches"] = json::parse(touch_journal_json(map.touches));
+    for (size_t t = 0; t < map.touches.touches.size(); ++t)
+      out["touches"][t]["voxels"] = map.touches.touches[t].region.voxels();
+    std::printf("%s\n", out.dump(2).c_str());
+    return kDone;
+  }
+  const auto text = [&](const BeliefSummary& belief) {
+    if (belief.class_probability.empty()) return std::string("?");
+    const int best = most_probable_class(belief.class_probability);
+    char numbers[64];
+    snprintf(numbers, sizeof numbers, " %.2f, %.3g +- %.3g", belief.class_probability[size_t(best)], belief.mean,
+             belief.sd);
+    return map.classes.at_slot(best).name + numbers;
+  };
+  for (const Touch& touch : map.touches.touches) {
+    const TouchRequest& r = touch.request;
+    std::printf("%s  %12.6f  %s %g at (%.3f, %.3f, %.3f), %zu voxels, %s%s\n    %s -> %s\n", id_text(touch.id).c_str(),
+                r.stamp_s, r.property.c_str(), r.value, touch.surface_m.x(), touch.surface_m.y(), touch.surface_m.z(),
+                touch.region.voxels(), model_name(r.model), touch.undone ? ", undone" : "", text(touch.before).c_str(),
+                text(touch.after).c_str());
+  }
+  if (map.touches.touches.empty()) std::printf("no touches\n");
+  return kDone;
+}
+
 TouchRequest request_of(const TouchOptions& options) {
   TouchRequest request;
   request.stamp_s = options.stamp_s;
@@ -88,6 +156,7 @@ TouchRequest request_of(const TouchOptions& options) {
 }
 
 int run_touch(const TouchOptions& options) {
+  if (options.list) return list_touches(options);
   const TouchRequest request = request_of(options);
   Map map = load_map(options.map);
   use_properties(map, options.properties);
@@ -101,11 +170,13 @@ int run_touch(const TouchOptions& options) {
     undo ? undo_touch(map, id) : redo_touch(map, id);
     out[undo ? "undone" : "redone"] = id_text(id);
     if (!options.json) std::printf("touch %s: %s\n", id_text(id).c_str(), undo ? "undone" : "redone");
-  } else if (!options.file.empty()) {
+  } else if (!options.file.empty() || options.frame) {
     out["touches"] = json::array();
+    const std::optional<OpenedSequence> opened = open_touched(options);
     for (const TouchOutcome& outcome :
-         apply_recorded_touches(map, read_touches(options.file), request, /*sequence=*/nullptr)) {
-      const std::string where = options.file + ":" + std::to_string(outcome.touch.line);
+         apply_recorded_touches(map, recorded_touches(options), request, opened ? &opened->touched : nullptr)) {
+      const std::string where = options.file.empty() ? "frame " + std::to_string(*options.frame)
+                                                     : options.file + ":" + std::to_string(outcome.touch.line);
       if (outcome.effect) {
         out["touches"].push_back(effect_json(map, *outcome.effect, request.region));
         if (!options.json) print_effect(map, *outcome.effect, request.region);
@@ -136,6 +207,9 @@ void add_touch(CLI::App& app) {
                   {"touch", "Record a reading of a property at a point and update the surface it speaks for",
                    "feltmap touch map.vdb --at 0.4,1.2,0.0 --property friction --value 0.139\n"
                    "feltmap touch map.vdb --file touches.csv --out touched.vdb\n"
+                   "feltmap touch map.vdb --sequence recording --frame 120 --pixel 310,225 --region mask "
+                   "--property friction --value 0.4\n"
+                   "feltmap touch map.vdb --list\n"
                    "feltmap touch map.vdb --undo 3f0c5d8a91e2b764"},
                   *options, [options] { return run_touch(*options); });
   command.add_option("map", options->map, "Map file")->required();
@@ -143,11 +217,22 @@ void add_touch(CLI::App& app) {
   what.require_option(1);
   CLI::Option* at = what.add_option("--at", options->at, "World point of a reading, metres: x,y,z")->check(check_point);
   what.add_option("--file", options->file, "Recorded touches (CSV): all of them, or none");
+  CLI::Option* frame =
+      what.add_option("--frame", options->frame, "Number of the frame of --sequence in which --pixel was touched");
   what.add_option("--undo", options->undo, "Take back the touch with this id");
   what.add_option("--redo", options->redo, "Let an undone touch count again");
+  what.add_flag("--list", options->list, "Show the journal: every touch with what was believed before and after");
   CLI::Option* property = command.add_option("--property", options->property, "What was measured");
   CLI::Option* value = command.add_option("--value", options->value, "The reading, in the property's unit");
   at->needs(property)->needs(value);
+  frame->needs(property)->needs(value);
+  command.add_option("--sequence", options->sequence,
+                     "Recording that --frame, or rows of --file with u and v, speak of");
+  command.add_option("--pixel", options->pixel, "u,v of the touch; with --region mask its region is the segment there")
+      ->delimiter(',')
+      ->expected(2);
+  command.add_option("--masks", options->masks, "Folder of instance images or masks to take that segment from")
+      ->check(CLI::ExistingDirectory);
   command.add_option("--sigma", options->sigma, "Standard deviation of the reading's noise")->capture_default_str();
   command.add_option("--stamp", options->stamp_s, "Time of the touch, seconds")->capture_default_str();
   command.add_option("--model", options->model, "material: the region is one material; mixture: each voxel its own")

@@ -77,8 +77,9 @@ Eigen::Vector3d point_of(const std::string& text) {
 }
 
 void RegionOptions::add_to(CLI::App& command) {
-  command.add_option("--region", rule, "connected, mask or sphere")
-      ->check(CLI::IsMember({"connected", "mask", "sphere"}))
+  command
+      .add_option("--region", rule, "connected, mask, sphere, instance: the thing touched, or segment of the whole map")
+      ->check(CLI::IsMember({"connected", "mask", "sphere", "instance", "segment"}))
       ->capture_default_str();
   command.add_option("--radius", settings.radius_m, "Limit in metres: along the surface, or of the sphere");
   command.add_option("--snap", settings.snap_voxels, "How far the surface may be from the point, voxels")
@@ -95,7 +96,9 @@ void RegionOptions::add_to(CLI::App& command) {
   command.add_option("--color-change", settings.color_change,
                      "Largest difference from the contact's colour, grey levels");
   command.add_option("--mask", mask, "Image whose non-zero pixels belong to the region (with --region mask)");
-  command.add_option("--intrinsics", intrinsics, "Camera of the mask: fx,fy,cx,cy")->delimiter(',')->expected(4);
+  command.add_option("--intrinsics", intrinsics, "Camera of the mask: fx,fy,cx,cy or fx,fy,cx,cy,width,height")
+      ->delimiter(',')
+      ->expected(4, 6);
   command.add_option("--pose", pose, "Camera to world of the mask: 16 numbers row by row")
       ->delimiter(',')
       ->expected(16);
@@ -110,7 +113,7 @@ RegionSettings RegionOptions::resolved() const {
 
 std::optional<ViewMask> RegionOptions::view() const {
   if (rule != "mask") return std::nullopt;
-  if (mask.empty() || intrinsics.size() != 4 || pose.size() != 16)
+  if (mask.empty() || (intrinsics.size() != 4 && intrinsics.size() != 6) || pose.size() != 16)
     throw TouchError("region mask: expected --mask, --intrinsics and --pose, found not all of them");
   return read_view_mask(mask, intrinsics, pose);
 }
@@ -170,6 +173,35 @@ std::string belief_text(const Map& map, const Belief& belief) {
     }
     out << *m;
     if (const auto v = variance(next)) out << " +- " << std::sqrt(*v);
+  }
+  return out.str();
+}
+
+std::string property_text(const json& belief) {
+  std::ostringstream out;
+  out.precision(3);
+  for (const auto& [name, p] : belief.at("properties").items()) {
+    out << "  " << name << ": ";
+    if (!p.contains("location")) {
+      out << p.at("reason").get<std::string>() << "\n";
+      continue;
+    }
+    const auto number = [&](const json& x) -> std::string {
+      if (x.is_null()) return "?";
+      std::ostringstream text;
+      text.precision(3);
+      text << x.get<double>();
+      return text.str();
+    };
+    out << number(p.at("mean")) << " +- " << number(p.at("sd"))
+        << ", 5 to 95 %: " << number(p.at("quantiles").at("0.05")) << " to " << number(p.at("quantiles").at("0.95"))
+        << ", CVaR: " << number(p.at("cvar").at("lower_0.05")) << " and " << number(p.at("cvar").at("upper_0.95"));
+    if (p.contains("below"))
+      out << ", P(<= " << p.at("below").at("threshold").get<double>() << ") "
+          << number(p.at("below").at("probability"));
+    if (p.contains("gait")) out << ", " << p.at("gait").at("decision").get<std::string>() << " gait";
+    if (p.contains("reason")) out << " (" << p.at("reason").get<std::string>() << ")";
+    out << "\n";
   }
   return out.str();
 }

@@ -40,6 +40,9 @@ nlohmann::ordered_json belief_json(const Map& map, const Belief& belief, std::op
 nlohmann::ordered_json summary_json(const Map& map, const RegionSummary& summary);
 nlohmann::ordered_json point_json(const Eigen::Vector3d& p);
 
+/// A line for each property of `belief_json`: mean, sd, quantiles, CVaR, and what it decides.
+std::string property_text(const nlohmann::ordered_json& belief);
+
 /// One line a person can read: "ice 0.97, friction 0.171 +- 0.043".
 std::string belief_text(const Map& map, const Belief& belief);
 

@@ -10,6 +10,7 @@ pkg_check_modules(EIGEN3 REQUIRED IMPORTED_TARGET eigen3)
 pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)
 pkg_check_modules(SPNG REQUIRED IMPORTED_TARGET spng)
 pkg_check_modules(TURBOJPEG REQUIRED IMPORTED_TARGET libturbojpeg)
+pkg_check_modules(BLOSC REQUIRED IMPORTED_TARGET blosc)
 pkg_check_modules(DEFLATE REQUIRED IMPORTED_TARGET libdeflate)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 
@@ -21,13 +22,25 @@ if(NOT TARGET OpenVDB::openvdb)
   find_package(OpenVDB 10 REQUIRED COMPONENTS openvdb)
 endif()
 
-# Debian's OpenCVConfig names every module that was built; these three are all we link.
-foreach(module core imgproc imgcodecs)
+# Debian's OpenCVConfig names every module that was built; these are all we link.
+foreach(module core imgproc imgcodecs dnn)
   find_library(FELTMAP_OPENCV_${module} opencv_${module} REQUIRED)
 endforeach()
 find_path(FELTMAP_OPENCV_INCLUDE opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
 if(NOT TARGET felt_opencv)
   add_library(felt_opencv INTERFACE IMPORTED)
   target_include_directories(felt_opencv SYSTEM INTERFACE "${FELTMAP_OPENCV_INCLUDE}")
-  target_link_libraries(felt_opencv INTERFACE ${FELTMAP_OPENCV_imgcodecs} ${FELTMAP_OPENCV_imgproc} ${FELTMAP_OPENCV_core})
+  target_link_libraries(felt_opencv INTERFACE ${FELTMAP_OPENCV_dnn} ${FELTMAP_OPENCV_imgcodecs} ${FELTMAP_OPENCV_imgproc} ${FELTMAP_OPENCV_core})
+endif()
+
+# ONNX Runtime is optional: Debian 13 has libonnxruntime-dev; elsewhere unpack a release and pass its folder as
+# -DFELTMAP_ONNXRUNTIME_ROOT=... (or leave it out: OpenCV runs the networks).
+set(FELTMAP_ONNXRUNTIME_ROOT "" CACHE PATH "Folder of an ONNX Runtime release (include/, lib/)")
+find_path(FELTMAP_ONNXRUNTIME_INCLUDE onnxruntime_cxx_api.h HINTS "${FELTMAP_ONNXRUNTIME_ROOT}/include"
+          PATH_SUFFIXES onnxruntime onnxruntime/core/session)
+find_library(FELTMAP_ONNXRUNTIME_LIBRARY onnxruntime HINTS "${FELTMAP_ONNXRUNTIME_ROOT}/lib")
+if(FELTMAP_ONNXRUNTIME_INCLUDE AND FELTMAP_ONNXRUNTIME_LIBRARY AND NOT TARGET felt_onnxruntime)
+  add_library(felt_onnxruntime INTERFACE IMPORTED)
+  target_include_directories(felt_onnxruntime SYSTEM INTERFACE "${FELTMAP_ONNXRUNTIME_INCLUDE}")
+  target_link_libraries(felt_onnxruntime INTERFACE "${FELTMAP_ONNXRUNTIME_LIBRARY}")
 endif()

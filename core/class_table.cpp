@@ -25,7 +25,12 @@ ClassTable::ClassTable(std::vector<ClassInfo> classes) : classes_(std::move(clas
       known_.resize(c.id + 1, false);
     }
     known_[c.id] = true;
+    if (!(c.prior > 0) || !std::isfinite(c.prior))
+      problems.push_back("class table: prior of '" + c.name + "': expected a number above 0, found " +
+                         std::to_string(c.prior));
     if (!c.ignore) {
+      prior_total_ += c.prior;
+      even_prior_ = even_prior_ && (by_slot_.empty() || c.prior == classes_[by_slot_[0]].prior);
       slot_of_id_[c.id] = uint16_t(by_slot_.size());
       by_slot_.push_back(uint32_t(row));
     }

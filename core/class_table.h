@@ -15,6 +15,7 @@ struct ClassInfo {
   std::string name;
   Rgba8 color;          ///< of views and meshes
   bool ignore = false;  ///< its pixels carry no label
+  double prior = 1;     ///< Dirichlet concentration before anything was seen, above 0
   bool operator==(const ClassInfo&) const = default;
 };
 
@@ -25,7 +26,8 @@ public:
   static constexpr uint16_t kNoSlot = 0xffff;
 
   ClassTable() = default;
-  /// Throws ConfigError naming every duplicate id or name, and where there is no class that is not ignored.
+  /// Throws ConfigError naming every duplicate id or name and every prior that is not a positive number, and where
+  /// there is no class that is not ignored.
   explicit ClassTable(std::vector<ClassInfo> classes);
 
   const std::vector<ClassInfo>& classes() const { return classes_; }
@@ -35,6 +37,10 @@ public:
   /// Slot of a label id, kNoSlot for ignored and unknown ids (`known` tells them apart).
   uint16_t slot_of_id(uint16_t id) const { return id < slot_of_id_.size() ? slot_of_id_[id] : kNoSlot; }
   bool known(uint16_t id) const { return id < known_.size() && known_[id]; }
+  double prior(int slot) const { return at_slot(slot).prior; }
+  double prior_total() const { return prior_total_; }
+  /// Whether all classes have one prior: sums over classes without evidence are then a product.
+  bool even_prior() const { return even_prior_; }
   std::optional<int> slot_of_name(const std::string& name) const;
   bool empty() const { return classes_.empty(); }
   bool operator==(const ClassTable& other) const { return classes_ == other.classes_; }
@@ -44,6 +50,8 @@ private:
   std::vector<uint32_t> by_slot_;
   std::vector<uint16_t> slot_of_id_;
   std::vector<bool> known_;
+  double prior_total_ = 0;
+  bool even_prior_ = true;
 };
 
 /// A colour for class number `i` that neighbours in the table do not share, for tables that name none.

@@ -13,10 +13,10 @@ struct DistinctStates {
   std::vector<uint32_t> state_of;  ///< of each entry of `voxels`: index into `first`
 };
 
-/// Groups `voxels` (indices into the planes) whose values agree bit for bit in every plane. Exact: hashes only narrow
-/// the comparison. Gives up, with `first` empty, as soon as more than `most_states` distinct states are certain; planes
-/// that vary most should come first, for that shows in them.
-DistinctStates distinct_states(std::span<const float* const> planes, std::span<const uint32_t> voxels,
+/// Groups `voxels` (indices below `n` into the planes) whose values agree bit for bit in every plane. Exact: hashes
+/// only narrow the comparison. Gives up, with `first` empty, as soon as more than `most_states` distinct states are
+/// certain; planes that vary most should come first, for that shows in them.
+DistinctStates distinct_states(std::span<const float* const> planes, size_t n, std::span<const uint32_t> voxels,
                                size_t most_states);
 
 }  // namespace felt

@@ -8,8 +8,9 @@
 #include <limits>
 #include <vector>
 
+#include "core/simd.h"
 #include "inference/batch_distinct.h"
-#include "inference/material.h"
+#include "inference/batch_material_kernels.h"
 
 namespace felt {
 namespace {
@@ -28,34 +29,68 @@ bool is_usable(const MaterialBatch& batch, size_t v) {
   return some;
 }
 
-/// Everything of one distinct state except the voxel's own concentration.
-struct State {
-  MomentMatchedView view;  ///< total concentration 1: `a` is p(class)
-  double surprise = 0;
-};
-
-State compute(const MaterialBatch& batch, size_t v, std::span<const Nig> prior, double rho) {
-  std::vector<double> belief;
-  for (const MaterialPlanes& p : batch.classes) belief.push_back(double(p.belief[v]));
-  const ReadingStatistics readings{double(batch.count[v]), double(batch.mean[v]) + batch.mean_origin,
-                                   double(batch.m2[v])};
-  const MaterialPosterior posterior = material_posterior(belief, prior, readings, rho);
-  return {moment_matched_view(posterior, prior, 1), posterior.belief.log_evidence};
-}
-
-void write(const MaterialBatch& batch, size_t v, const State& state) {
-  const double total = double(batch.concentration[v]) + double(batch.count[v]);
-  for (size_t c = 0; c < batch.classes.size(); ++c) {
-    const MaterialPlanes& p = batch.classes[c];
-    p.a[v] = std::max(float(state.view.a[c] * total), std::numeric_limits<float>::min());
-    if (p.tau == nullptr) continue;
-    p.tau[v] = float(state.view.nig[c].tau - p.tau_origin);
-    p.kappa[v] = float(state.view.nig[c].kappa);
-    p.beta[v] = float(state.view.nig[c].beta);
-    p.gamma[v] = float(state.view.nig[c].gamma);
+/// Distinct states of a batch in planes of their own, padded to whole vectors.
+class GatheredStates {
+public:
+  GatheredStates(const MaterialBatch& from, std::span<const uint32_t> voxels)
+      : size_(voxels.size()),
+        padded_((size_ + kBatchLanes - 1) / kBatchLanes * kBatchLanes),
+        values_((4 + 6 * from.classes.size()) * padded_),
+        classes_(from.classes.begin(), from.classes.end()) {
+    float* at = values_.data();
+    const auto take = [&] { return std::exchange(at, at + padded_); };
+    const auto gather = [&](const float* plane) {
+      float* own = take();
+      for (size_t i = 0; i < padded_; ++i) own[i] = plane[voxels[std::min(i, size_ - 1)]];
+      return own;
+    };
+    batch_ = {padded_, gather(from.count), gather(from.mean), gather(from.m2), from.mean_origin, nullptr, classes_,
+              take()};
+    for (MaterialPlanes& p : classes_) {
+      p.belief = gather(p.belief);
+      for (float** plane : {&p.a, &p.tau, &p.kappa, &p.beta, &p.gamma}) *plane = take();
+    }
   }
-  if (batch.surprise != nullptr) batch.surprise[v] = float(state.surprise);
-}
+
+  void compute(double rho, std::vector<float>& scratch) const {
+    const bool priors_fit = std::all_of(classes_.begin(), classes_.end(), [](const MaterialPlanes& p) {
+      return !has_prior(p.prior) || fits_kernel(p.prior);
+    });
+    const bool vectors = priors_fit && !simd_scalar_forced();
+    if (vectors) material_kernel_simd(batch_, rho, scratch);
+    for (size_t i = 0; i < size_; ++i)
+      if (!vectors || !fits(i)) material_kernel_scalar(batch_, i, rho);
+  }
+
+  /// State i to one voxel of `to`.
+  void scatter(size_t i, const MaterialBatch& to, size_t voxel) const {
+    const float total = to.concentration[voxel] + to.count[voxel];
+    for (size_t c = 0; c < classes_.size(); ++c) {
+      const MaterialPlanes &from = classes_[c], &p = to.classes[c];
+      p.a[voxel] = std::max(from.a[i] * total, std::numeric_limits<float>::min());
+      if (p.tau == nullptr) continue;
+      p.tau[voxel] = from.tau[i];
+      p.kappa[voxel] = from.kappa[i];
+      p.beta[voxel] = from.beta[i];
+      p.gamma[voxel] = from.gamma[i];
+    }
+    if (to.surprise != nullptr) to.surprise[voxel] = batch_.surprise[i];
+  }
+
+private:
+  bool fits(size_t i) const {
+    float most = 0;
+    for (const MaterialPlanes& p : classes_)
+      if (has_prior(p.prior)) most = std::max(most, p.belief[i]);
+    return most >= kLeastScale && most <= kMostScale && batch_.count[i] >= kLeastCount &&
+           batch_.count[i] <= kMostCount && std::abs(batch_.mean[i]) <= kMostLocation;
+  }
+
+  size_t size_, padded_;
+  std::vector<float> values_;
+  std::vector<MaterialPlanes> classes_;
+  MaterialBatch batch_;
+};
 
 MaterialCounts view_of(const MaterialBatch& batch, double rho) {
   MaterialCounts counts;
@@ -68,18 +103,16 @@ MaterialCounts view_of(const MaterialBatch& batch, double rho) {
       ++counts.refused;
     }
   }
+  if (voxels.empty()) return counts;
   std::vector<const float*> planes{batch.count, batch.mean, batch.m2};
-  std::vector<Nig> prior;
-  for (const MaterialPlanes& p : batch.classes) {
-    planes.push_back(p.belief);
-    prior.push_back(p.prior);
-  }
-  const DistinctStates distinct = distinct_states(planes, voxels, voxels.size());
-  std::vector<State> states;
-  for (uint32_t v : distinct.first) states.push_back(compute(batch, v, prior, rho));
-  for (size_t i = 0; i < voxels.size(); ++i) write(batch, voxels[i], states[distinct.state_of[i]]);
+  for (const MaterialPlanes& p : batch.classes) planes.push_back(p.belief);
+  const DistinctStates distinct = distinct_states(planes, batch.n, voxels, voxels.size());
+  const GatheredStates states(batch, distinct.first);
+  std::vector<float> scratch;
+  states.compute(rho, scratch);
+  for (size_t i = 0; i < voxels.size(); ++i) states.scatter(distinct.state_of[i], batch, voxels[i]);
   counts.updated = voxels.size();
-  counts.computed = states.size();
+  counts.computed = distinct.first.size();
   return counts;
 }
 

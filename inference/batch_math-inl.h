@@ -22,6 +22,7 @@ using pair::M;
 using pair::V;
 
 HWY_INLINE V constant(float x) { return pair::Set(x); }
+HWY_INLINE V clamp_to(V x, float least, float most) { return pair::Min(pair::Max(x, constant(least)), constant(most)); }
 
 /// c[0] + c[1] x + ...: even and odd powers apart, which halves the chain of dependent operations.
 template <size_t N>
@@ -99,6 +100,27 @@ HWY_INLINE V shifted_log_minus_digamma(V t) {
 /// D(x) = ln x - digamma(x): by digamma(x) = digamma(1 + x) - 1/x, a sum of two positive terms.
 HWY_INLINE V log_minus_digamma_of(Reciprocals of) {
   return pair::Sub(shifted_log_minus_digamma(of.of_x_plus_1), log1p_of(of.of_x).log_minus_x);
+}
+
+/// D(x) for x >= 1 without a logarithm: inv_x = 1/x, t = 1/(x + 1/2).
+HWY_INLINE V log_minus_digamma_from_1(V inv_x, V t) {
+  constexpr float kTimesX[] = {0.4999999899f,    0.08333485523f,    0.04162951889f, 0.01283327171f,
+                               -0.003436304799f, -0.0009508899741f, 0.001807163178f};
+  return pair::Mul(inv_x, polynomial(t, kTimesX));
+}
+
+/// digamma(x + 1/2) - digamma(x) - 1/(2x) for x >= 1; arguments as above. Accurate relative to D(x).
+HWY_INLINE V digamma_half_step_from_1(V inv_x, V t) {
+  constexpr float kStep[] = {0.1250098996f, 0.06226047803f, 0.01752418152f, -0.01448701287f, 0.002760463249f};
+  return pair::Mul(pair::Mul(inv_x, t), polynomial(t, kStep));
+}
+
+/// x with D(x) = s for 0 < s <= kMostSmallD, that is x >= 1.
+constexpr float kMostSmallD = 0.577215f;
+HWY_INLINE V inverse_log_minus_digamma_from_1(V s) {
+  constexpr float kTimesS[] = {0.5000000284f,  0.1666596841f,   -0.05527446482f, -0.0339360106f,
+                               0.09017118863f, -0.07931524212f, 0.02790685356f};
+  return pair::Div(polynomial(s, kTimesS), s);
 }
 
 /// c(x) = x^2 trigamma(x) - x = -x^2 D'(x), t = 1/(1 + x).

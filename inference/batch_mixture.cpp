@@ -106,7 +106,7 @@ MixtureCounts update_task(const MixtureBatch& batch, const MixtureReading& readi
   const std::vector<float*> planes = state_planes(batch.classes);
   const std::vector<const float*> readable(planes.begin(), planes.end());
   // Gathering and scattering costs about a tenth of an update.
-  DistinctStates distinct = distinct_states(readable, voxels, voxels.size() * 3 / 4 + 1);
+  DistinctStates distinct = distinct_states(readable, batch.n, voxels, voxels.size() * 3 / 4 + 1);
   MixtureCounts counts;
   if (!distinct.first.empty()) {
     update_gathered(batch, distinct.first, voxels, distinct.state_of, reading, scratch);
@@ -116,8 +116,9 @@ MixtureCounts update_task(const MixtureBatch& batch, const MixtureReading& readi
     const size_t whole = voxels.size() == batch.n ? batch.n / kBatchLanes * kBatchLanes : 0;
     run_kernel(batch, 0, whole, reading, scratch);
     const auto rest = std::span<const uint32_t>(voxels).subspan(whole);
-    std::iota(distinct.state_of.begin(), distinct.state_of.end(), 0u);
-    if (!rest.empty()) update_gathered(batch, rest, rest, distinct.state_of, reading, scratch);
+    std::vector<uint32_t> each(rest.size());
+    std::iota(each.begin(), each.end(), 0u);
+    if (!rest.empty()) update_gathered(batch, rest, rest, each, reading, scratch);
     counts.computed = voxels.size();
   }
   for (uint32_t v : voxels) counts.updated += batch.updated[v] == kUpdated;

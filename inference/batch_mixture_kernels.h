@@ -5,12 +5,10 @@
 #include <span>
 #include <vector>
 
+#include "inference/batch_limits.h"
 #include "inference/batch_mixture.h"
 
 namespace felt {
-
-/// Kernels work on whole vectors: voxel counts are multiples of this (two of the widest vectors).
-inline constexpr size_t kBatchLanes = 32;
 
 /// What the kernels need of one reading.
 struct MixtureReading {
@@ -18,11 +16,6 @@ struct MixtureReading {
   double noise_sd = 0;
   Projection projection = Projection::kl;
 };
-
-/// Ranges outside of which a state is refused and to which results are clamped.
-inline constexpr float kLeastCount = 1e-15f, kMostCount = 1e15f;  // a, kappa, beta
-inline constexpr float kLeastScale = 1e-30f, kMostScale = 1e30f;  // gamma
-inline constexpr float kMostLocation = 1e18f;                     // |tau - tau_origin|
 
 /// What a kernel says of a voxel in `MixtureBatch::updated`.
 enum : uint8_t {

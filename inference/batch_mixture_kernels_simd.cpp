@@ -1,5 +1,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "inference/batch_mixture_kernels_simd.cpp"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
@@ -11,16 +12,16 @@
 #include "inference/batch_math-inl.h"
 #include "inference/batch_mixture_kernels.h"
 #include "inference/batch_projection-inl.h"
+#include "inference/batch_row-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace felt {
 namespace HWY_NAMESPACE {
 
-/// One tile: as many voxels as a vector has lanes, all classes.
+/// One tile: as many voxels as a vector has lanes, all classes. `kNoisy`: the reading has noise.
+template <Projection kProjection, bool kNoisy>
 class MixtureTile {
 public:
-  static constexpr size_t kRows = 18;
-
   MixtureTile(const MixtureBatch& batch, const MixtureReading& reading, float* scratch)
       : batch_(batch),
         reading_(reading),
@@ -32,29 +33,28 @@ public:
   HWY_INLINE void update(size_t voxel) {
     read_as_each_class(voxel);
     weigh();
-    const V one = constant(1.0f), zero = pair::Zero();
-    V overlap = zero, cross = zero;
+    writable_ = pair::AndNot(too_noisy_, usable_);
+    all_writable_ = pair::AllTrue(writable_);
+    DirichletStart start;
+    const DirichletRows rows{row(kA), row(kWeight), row(kNotR), row(kStep), row(kShare), row(kResidual), row(kSlope)};
     for (size_t c = 0; c < k_; ++c) {
       const V a = row(kA).load(c), w = row(kWeight).load(c);
-      const V r = pair::Mul(w, inv_total_weight_);
-      const V not_r =
-          pair::IfThenElse(pair::Eq(w, one), pair::Mul(other_weight_, inv_total_weight_), pair::Sub(one, r));
+      const V r = weights_.share(w), not_r = weights_.not_share(w);
       row(kWeight).store(r, c);
       row(kNotR).store(not_r, c);
       if (batch_.classes[c].tau != nullptr) project_nig(voxel, c, r, not_r);
-      overlap = pair::MulAdd(r, not_r, overlap);
-      cross = pair::MulAdd(pair::Add(a, r), pair::Add(pair::Sub(total_, a), not_r), cross);
-      if (reading_.projection == Projection::published) {
+      if (kProjection == Projection::published) {
         row(kStep).store(published_step(a, r, not_r), c);
+      } else {
+        start.add(rows, c, a, r, not_r);
       }
     }
     if (k_ == 1) {
-      row(kStep).store(one, 0);
-    } else if (reading_.projection == Projection::kl) {
-      const DirichletRows rows{row(kA),  row(kWeight),   row(kNotR),      row(kStep),     row(kInvA),
-                               row(kTA), row(kShiftedA), row(kShareTerm), row(kResidual), row(kSlope)};
-      project_dirichlet(rows, k_, total_, overlap, cross, usable_);
+      row(kStep).store(constant(1.0f), 0);
+    } else if (kProjection == Projection::kl) {
+      project_dirichlet(rows, start, k_, total_, usable_);
     }
+    if (kProjection == Projection::published) write_valid_blocks(voxel);
     write(voxel);
   }
 
@@ -64,21 +64,25 @@ private:
     kWeight,  // log weight, weight, then responsibility
     kNotR,
     kStep,
-    kTau,
+    kBetaInverse,
+    kExcess,
+    kCurve,
+    kInvKappa,
+    kShare,
+    kResidual,
+    kSlope,
+    kTau,  // from here: `published` alone
     kKappa,
     kBeta,
     kGamma,
-    kBetaInverse,
-    kBetaT,
-    kExcess,
-    kInvKappa,
-    kInvA,
-    kTA,
-    kShiftedA,
-    kShareTerm,
-    kResidual,
-    kSlope
+    kRows
   };
+
+public:
+  static constexpr size_t kMostRows = kRows;
+
+private:
+  static constexpr size_t kCacheLine = 64 / sizeof(float);
 
   HWY_INLINE Row row(size_t which) const { return Row(rows_ + which * k_ * lanes_, lanes_); }
 
@@ -86,6 +90,20 @@ private:
     const MixturePlanes& p = batch_.classes[c];
     return {pair::LoadU(p.tau + voxel), pair::LoadU(p.kappa + voxel), pair::LoadU(p.beta + voxel),
             pair::LoadU(p.gamma + voxel)};
+  }
+
+  /// A map keeps 5 k planes apart: more streams than processors foresee.
+  HWY_INLINE void fetch_next(size_t voxel, size_t c) const {
+    const MixturePlanes& p = batch_.classes[c];
+    for (const float* plane : {p.a, p.tau, p.kappa, p.beta, p.gamma}) {
+      if (plane == nullptr) return;
+      for (size_t i = 0; i < lanes_; i += kCacheLine) hwy::Prefetch(plane + voxel + lanes_ + i);
+    }
+  }
+
+  HWY_INLINE void store(V x, float* plane) const {
+    if (HWY_LIKELY(all_writable_)) return pair::StoreU(x, plane);
+    pair::BlendedStore(x, writable_, plane);
   }
 
   /// psi - tau, exact to the last bit of the stored tau: psi less the origin is split in two floats.
@@ -98,7 +116,7 @@ private:
 
   /// s = v/(v + noise variance), v = gamma/beta: what a noisy reading counts.
   HWY_INLINE V tempering(const NigVectors& p) const {
-    if (reading_.noise_sd == 0) return constant(1.0f);
+    if (!kNoisy) return constant(1.0f);
     return pair::Div(p.gamma, pair::MulAdd(p.beta, noise_variance_, p.gamma));
   }
 
@@ -117,6 +135,7 @@ private:
     usable_ = pair::Eq(one, one);
     too_noisy_ = pair::Lt(one, one);
     for (size_t c = 0; c < k_; ++c) {
+      fetch_next(voxel, c);
       const V a = pair::LoadU(batch_.classes[c].a + voxel);
       row(kA).store(a, c);
       total_ = pair::Add(total_, a);
@@ -125,61 +144,75 @@ private:
       taking_part_ = pair::Add(taking_part_, a);
       const NigVectors p = load_nig(voxel, c);
       usable_ = pair::And(usable_, is_usable(p));
-      const V s = tempering(p);
-      const V inv_kappa = pair::Div(one, pair::Add(p.kappa, s));
+      const Reciprocals of_beta = reciprocals(p.beta);
+      // 1/(kappa + s) and beta/(beta + w) from one division; G(b + 1/2)/G(b) = b/sqrt(b + w).
+      const V s = tempering(p), kappa_s = pair::Add(p.kappa, s);
+      const V beta_w = pair::Add(p.beta, half_step_excess(of_beta.of_x_plus_1));
+      const V inv_both = pair::Div(one, pair::Mul(kappa_s, beta_w));
+      const V inv_kappa = pair::Mul(beta_w, inv_both);
       const V kept = pair::Mul(p.kappa, pair::Mul(s, inv_kappa));
+      const V shape = pair::Mul(p.beta, pair::Mul(kappa_s, inv_both));
       const V d = deviation(c, p.tau);
-      if (reading_.noise_sd != 0) too_noisy_ = pair::Or(too_noisy_, needs_quadrature(p, d));
+      if (kNoisy) too_noisy_ = pair::Or(too_noisy_, needs_quadrature(p, d));
       const V inv_gamma = pair::Div(one, p.gamma);
       const V excess =
           pair::Min(pair::Mul(pair::Mul(pair::Mul(half, kept), pair::Mul(d, inv_gamma)), d), constant(1e30f));
-      const Reciprocals of_beta = reciprocals(p.beta);
-      // ln of a Student-t: G(b + 1/2)/G(b) = b/sqrt(b + w); kappa s/(kappa + s) b/gamma is the inverse squared scale.
-      const V shape = pair::Div(p.beta, pair::Add(p.beta, half_step_excess(of_beta.of_x_plus_1)));
+      // ln of a times a Student-t; kappa s/(kappa + s) b/gamma is the inverse squared scale.
       const V inv_scale2 = pair::Mul(pair::Mul(p.beta, inv_gamma), pair::Mul(kept, shape));
-      const V log_density = pair::NegMulAdd(pair::Add(p.beta, half), log1p_of(excess).log,
-                                            pair::Mul(half, log_of(clamp_to(inv_scale2, 1.2e-38f, 3e38f))));
-      const V log_weight = pair::Add(log_of(a), log_density);
+      const V height = pair::Mul(a, pair::Sqrt(clamp_to(inv_scale2, 1.2e-38f, 3e38f)));
+      const Log1p of_excess = log1p_of(excess);
+      const V log_weight = pair::NegMulAdd(pair::Add(p.beta, half), of_excess.log, log_of(height));
       most_ = pair::Max(most_, log_weight);
       row(kWeight).store(log_weight, c);
       row(kBetaInverse).store(of_beta.of_x, c);
-      row(kBetaT).store(of_beta.of_x_plus_1, c);
       row(kExcess).store(excess, c);
+      row(kCurve).store(log_curve(of_excess, excess), c);
       row(kInvKappa).store(inv_kappa, c);
     }
   }
 
-  /// Weights relative to the largest. What the others weigh together is summed apart, so that 1 - r of the largest
-  /// keeps its digits where r is within rounding of 1.
   HWY_INLINE void weigh() {
-    const V one = constant(1.0f), zero = pair::Zero();
-    V others = zero, largest = zero;
+    weights_ = Weights();
     for (size_t c = 0; c < k_; ++c) {
-      const V w = batch_.classes[c].tau == nullptr ? zero : exp_of_negative(pair::Sub(row(kWeight).load(c), most_));
+      const bool takes_part = batch_.classes[c].tau != nullptr;
+      const V w = takes_part ? exp_of_negative(pair::Sub(row(kWeight).load(c), most_)) : pair::Zero();
       row(kWeight).store(w, c);
-      const M ties = pair::Eq(w, one);
-      largest = pair::Add(largest, pair::IfThenElseZero(ties, one));
-      others = pair::Add(others, pair::IfThenZeroElse(ties, w));
+      weights_.add(w);
     }
-    other_weight_ = pair::Add(others, pair::Sub(largest, one));
-    total_weight_ = pair::Add(one, other_weight_);
-    inv_total_weight_ = pair::Div(one, total_weight_);
+    weights_.close();
   }
 
   HWY_INLINE void project_nig(size_t voxel, size_t c, V r, V not_r) {
     const NigVectors p = load_nig(voxel, c);
-    const Reciprocals of_beta{row(kBetaInverse).load(c), row(kBetaT).load(c)};
-    const V s = tempering(p), inv_kappa = row(kInvKappa).load(c);
-    const NigUpdate u{pair::Mul(constant(0.5f), s), pair::Mul(s, row(kExcess).load(c)), inv_kappa,
-                      pair::Mul(pair::Mul(s, deviation(c, p.tau)), inv_kappa)};
-    const NigVectors out =
-        reading_.projection == Projection::kl
-            ? project_kl(p, of_beta, u, r, not_r)
-            : project_published(p, constant(float(batch_.classes[c].tau_origin)), of_beta, u, r, not_r);
-    row(kTau).store(out.tau, c);
-    row(kKappa).store(out.kappa, c);
-    row(kBeta).store(out.beta, c);
-    row(kGamma).store(out.gamma, c);
+    const V inv_beta = row(kBetaInverse).load(c), inv_kappa = row(kInvKappa).load(c), s = tempering(p);
+    NigUpdate u;
+    u.beta_step = pair::Mul(constant(0.5f), s);
+    u.gain = pair::Mul(u.beta_step, inv_beta);
+    u.excess = row(kExcess).load(c);
+    u.inv_kappa = inv_kappa;
+    u.shift = pair::Mul(pair::Mul(s, deviation(c, p.tau)), inv_kappa);
+    u.pull = pair::Mul(pair::Mul(constant(2.0f), pair::Mul(p.beta, s)), pair::Mul(u.excess, inv_kappa));
+    // Of a noisy reading's square only the share s is the class's own.
+    if (kNoisy) u.excess = pair::Mul(s, u.excess);
+    u.curve = kNoisy ? log_curve(log1p_of(u.excess), u.excess) : row(kCurve).load(c);
+    if (kProjection == Projection::published) {
+      const V origin = constant(float(batch_.classes[c].tau_origin));
+      const NigVectors out = project_published(p, origin, inv_beta, u, r, not_r);
+      row(kTau).store(out.tau, c);
+      row(kKappa).store(out.kappa, c);
+      row(kBeta).store(out.beta, c);
+      row(kGamma).store(out.gamma, c);
+      return;
+    }
+    const M says = says_something(p, u, r);
+    if (pair::AllFalse(says)) return;
+    const ShapeTerms shape = kNoisy ? shape_terms(p.beta, u) : half_step_shape_terms(p.beta, inv_beta, u);
+    const NigVectors out = project_kl(p, inv_beta, shape, u, r, not_r);
+    const MixturePlanes& planes = batch_.classes[c];
+    store(pair::IfThenElse(says, out.tau, p.tau), planes.tau + voxel);
+    store(pair::IfThenElse(says, out.kappa, p.kappa), planes.kappa + voxel);
+    store(pair::IfThenElse(says, out.beta, p.beta), planes.beta + voxel);
+    store(pair::IfThenElse(says, out.gamma, p.gamma), planes.gamma + voxel);
   }
 
   /// a^ - a by E[w] (E[w] - E[w^2])/(E[w^2] - E[w]^2), all sums of positive terms.
@@ -192,35 +225,46 @@ private:
     return pair::Sub(pair::Div(pair::Mul(x, numerator), denominator), a);
   }
 
-  HWY_INLINE void write(size_t voxel) const {
-    M valid = pair::AndNot(too_noisy_, usable_);
+  /// `published`: a voxel is written only where all of its classes are valid.
+  HWY_INLINE void write_valid_blocks(size_t voxel) {
     for (size_t c = 0; c < k_; ++c) {
-      const V a = pair::Add(row(kA).load(c), row(kStep).load(c));
-      row(kStep).store(reading_.projection == Projection::kl ? clamp_count(a) : a, c);
-      valid = pair::And(valid, is_count(row(kStep).load(c)));
+      writable_ = pair::And(writable_, is_count(pair::Add(row(kA).load(c), row(kStep).load(c))));
       if (batch_.classes[c].tau == nullptr) continue;
-      valid = pair::And(valid,
-                        is_usable({row(kTau).load(c), row(kKappa).load(c), row(kBeta).load(c), row(kGamma).load(c)}));
+      const NigVectors out{row(kTau).load(c), row(kKappa).load(c), row(kBeta).load(c), row(kGamma).load(c)};
+      writable_ = pair::And(writable_, is_usable(out));
     }
+    all_writable_ = pair::AllTrue(writable_);
     for (size_t c = 0; c < k_; ++c) {
       const MixturePlanes& p = batch_.classes[c];
-      pair::BlendedStore(row(kStep).load(c), valid, p.a + voxel);
-      if (p.responsibility != nullptr) pair::BlendedStore(row(kWeight).load(c), valid, p.responsibility + voxel);
       if (p.tau == nullptr) continue;
-      pair::BlendedStore(row(kTau).load(c), valid, p.tau + voxel);
-      pair::BlendedStore(row(kKappa).load(c), valid, p.kappa + voxel);
-      pair::BlendedStore(row(kBeta).load(c), valid, p.beta + voxel);
-      pair::BlendedStore(row(kGamma).load(c), valid, p.gamma + voxel);
+      store(row(kTau).load(c), p.tau + voxel);
+      store(row(kKappa).load(c), p.kappa + voxel);
+      store(row(kBeta).load(c), p.beta + voxel);
+      store(row(kGamma).load(c), p.gamma + voxel);
+    }
+  }
+
+  /// Concentrations, what was asked for besides, and the verdict.
+  HWY_INLINE void write(size_t voxel) const {
+    for (size_t c = 0; c < k_; ++c) {
+      const MixturePlanes& p = batch_.classes[c];
+      const V a = pair::Add(row(kA).load(c), row(kStep).load(c));
+      store(kProjection == Projection::kl ? clamp_count(a) : a, p.a + voxel);
+      if (p.responsibility != nullptr) store(row(kWeight).load(c), p.responsibility + voxel);
     }
     if (batch_.log_evidence != nullptr) {
-      const V share = log_of(pair::Div(total_weight_, taking_part_));
+      const V share = log_of(pair::Div(weights_.total(), taking_part_));
       const V log_evidence =
           pair::Add(pair::Sub(most_, constant(0.5f * std::log(2 * std::numbers::pi_v<float>))), share);
-      pair::BlendedStore(log_evidence, valid, batch_.log_evidence + voxel);
+      store(log_evidence, batch_.log_evidence + voxel);
+    }
+    if (HWY_LIKELY(all_writable_)) {
+      std::fill_n(batch_.updated + voxel, lanes_, uint8_t(kUpdated));
+      return;
     }
     float state[2 * HWY_MAX_BYTES / sizeof(float)];
     const V noisy = pair::IfThenElseZero(pair::And(usable_, too_noisy_), constant(float(kTooNoisy)));
-    pair::StoreU(pair::IfThenElse(valid, constant(float(kUpdated)), noisy), state);
+    pair::StoreU(pair::IfThenElse(writable_, constant(float(kUpdated)), noisy), state);
     for (size_t lane = 0; lane < lanes_; ++lane) batch_.updated[voxel + lane] = uint8_t(state[lane]);
   }
 
@@ -230,16 +274,27 @@ private:
   float* rows_;
   V noise_variance_;
   V total_, taking_part_, most_;  // sum of a; of classes that take part; largest log weight
-  V other_weight_, total_weight_, inv_total_weight_;
-  M usable_, too_noisy_;
+  Weights weights_;
+  M usable_, too_noisy_, writable_;
+  bool all_writable_ = false;
 };
 
-void MixtureKernel(const MixtureBatch& batch, size_t begin, size_t end, const MixtureReading& reading, float* scratch) {
-  MixtureTile tile(batch, reading, scratch);
+template <Projection kProjection, bool kNoisy>
+void run_tiles(const MixtureBatch& batch, size_t begin, size_t end, const MixtureReading& reading, float* scratch) {
+  MixtureTile<kProjection, kNoisy> tile(batch, reading, scratch);
   for (size_t voxel = begin; voxel < end; voxel += pair::lanes()) tile.update(voxel);
 }
 
-size_t MixtureScratch(size_t classes) { return MixtureTile::kRows * classes * pair::lanes(); }
+void MixtureKernel(const MixtureBatch& batch, size_t begin, size_t end, const MixtureReading& reading, float* scratch) {
+  const bool kl = reading.projection == Projection::kl, noisy = reading.noise_sd != 0;
+  const auto tiles = kl ? (noisy ? run_tiles<Projection::kl, true> : run_tiles<Projection::kl, false>)
+                        : (noisy ? run_tiles<Projection::published, true> : run_tiles<Projection::published, false>);
+  tiles(batch, begin, end, reading, scratch);
+}
+
+size_t MixtureScratch(size_t classes) {
+  return MixtureTile<Projection::published, false>::kMostRows * classes * pair::lanes();
+}
 
 }  // namespace HWY_NAMESPACE
 }  // namespace felt

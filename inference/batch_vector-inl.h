@@ -63,6 +63,7 @@ HWY_INLINE M And(M a, M b) { return {hn::And(a.lo, b.lo), hn::And(a.hi, b.hi)}; 
 HWY_INLINE M Or(M a, M b) { return {hn::Or(a.lo, b.lo), hn::Or(a.hi, b.hi)}; }
 HWY_INLINE M AndNot(M a, M b) { return {hn::AndNot(a.lo, b.lo), hn::AndNot(a.hi, b.hi)}; }
 HWY_INLINE bool AllFalse(M a) { return hn::AllFalse(Tag(), hn::Or(a.lo, a.hi)); }
+HWY_INLINE bool AllTrue(M a) { return hn::AllTrue(Tag(), hn::And(a.lo, a.hi)); }
 HWY_INLINE V IfThenElse(M m, V a, V b) { return {hn::IfThenElse(m.lo, a.lo, b.lo), hn::IfThenElse(m.hi, a.hi, b.hi)}; }
 HWY_INLINE V IfThenElseZero(M m, V a) { return {hn::IfThenElseZero(m.lo, a.lo), hn::IfThenElseZero(m.hi, a.hi)}; }
 HWY_INLINE V IfThenZeroElse(M m, V a) { return {hn::IfThenZeroElse(m.lo, a.lo), hn::IfThenZeroElse(m.hi, a.hi)}; }

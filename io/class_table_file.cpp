@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <cmath>
+#include <sstream>
 
 #include "core/error.h"
 #include "io/text_input.h"
@@ -27,6 +30,17 @@ bool means_no_class(const std::string& name) {
 std::optional<uint16_t> id_of(std::string_view word) {
   const auto number = parse_integer(word);
   return number && *number >= 0 && *number <= 0xffff ? std::optional<uint16_t>(uint16_t(*number)) : std::nullopt;
+}
+
+/// A name as YAML reads it back: plain where it is made of letters, digits, blanks, '_' and '-'.
+std::string quoted_name(const std::string& name) {
+  const auto plain = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-' || c == ' '; };
+  const bool letters =
+      std::all_of(name.begin(), name.end(), plain) && std::isalpha(uint8_t(name.front())) && name.back() != ' ';
+  if (letters) return name;
+  std::string text = "'";
+  for (const char c : name) text += c == '\'' ? "''" : std::string(1, c);
+  return text + "'";
 }
 
 std::optional<Rgba8> color_of(const std::vector<std::string>& words) {
@@ -76,10 +90,18 @@ void read_yaml_class(const YAML::Node& row, const fs::path& path, Table& table) 
       table.problems.push_back(
           describe_mismatch(where, "ignore", "true or false", "'" + scalar_text(row["ignore"]) + "'"));
   }
+  if (row["prior"]) {
+    const auto prior = parse_number(scalar_text(row["prior"]));
+    if (prior && *prior > 0 && std::isfinite(*prior))
+      info.prior = *prior;
+    else
+      table.problems.push_back(
+          describe_mismatch(where, "prior", "a number above 0", "'" + scalar_text(row["prior"]) + "'"));
+  }
   for (const auto& entry : row) {
     const std::string key = scalar_text(entry.first);
-    if (key != "id" && key != "name" && key != "color" && key != "ignore")
-      table.problems.push_back(describe_mismatch(where, "key", "id, name, color or ignore", "'" + key + "'"));
+    if (key != "id" && key != "name" && key != "color" && key != "ignore" && key != "prior")
+      table.problems.push_back(describe_mismatch(where, "key", "id, name, color, ignore or prior", "'" + key + "'"));
   }
   // A class whose id is unreadable would also be reported as a duplicate of class 0.
   if (id && !info.name.empty()) table.classes.push_back(info);
@@ -139,6 +161,18 @@ ClassTable read_class_table(const fs::path& path) {
     table.problems.push_back(path.string() + ": " + fault.what());
   }
   throw ConfigError(table.problems);
+}
+
+std::string class_table_yaml(const ClassTable& classes) {
+  std::ostringstream text;
+  text << "classes:\n";
+  for (const ClassInfo& c : classes.classes()) {
+    text << "  - {id: " << c.id << ", name: " << quoted_name(c.name) << ", color: [" << int(c.color.r) << ", "
+         << int(c.color.g) << ", " << int(c.color.b) << "]" << (c.ignore ? ", ignore: true" : "");
+    if (c.prior != 1) text << ", prior: " << c.prior;
+    text << "}\n";
+  }
+  return text.str();
 }
 
 }  // namespace felt

@@ -79,6 +79,24 @@ std::vector<ClassReadings> read_readings_csv(const std::filesystem::path& file) 
   return classes;
 }
 
+PropertyTable fitted_properties(const std::vector<ClassReadings>& classes, const std::string& name,
+                                const std::string& unit, double max_nu_0) {
+  Property property;
+  property.name = name;
+  property.unit = unit;
+  property.max_prior_readings = max_nu_0;
+  std::vector<PriorFit> fits;
+  for (const ClassReadings& c : classes) {
+    const std::optional<PriorFit> fit = fit_prior(c.groups, max_nu_0);
+    if (!fit) continue;
+    fits.push_back(*fit);
+    property.priors[c.name] = {fit->mean, fit->sd, fit->effective_readings};
+  }
+  if (fits.empty()) throw ConfigError("priors: expected a class with at least two readings that differ, found none");
+  property.rho = pooled_rho(fits).value_or(property.rho);
+  return PropertyTable({property});
+}
+
 std::string fit_priors_json(const std::vector<ClassReadings>& classes, double max_nu_0) {
   using nlohmann::ordered_json;
   ordered_json out{{"classes", ordered_json::array()}};

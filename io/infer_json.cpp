@@ -1,7 +1,7 @@
 #include "io/infer_json.h"
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
@@ -12,6 +12,7 @@
 #include "inference/mixture.h"
 #include "inference/priors.h"
 #include "io/infer_request.h"
+#include "io/infer_single.h"
 
 namespace felt {
 namespace {
@@ -39,17 +40,23 @@ ordered_json blocks(const std::vector<double>& a, const std::vector<Nig>& nig) {
   return {{"a", list(a)}, {"tau", tau}, {"kappa", kappa}, {"beta", beta}, {"gamma", gamma}};
 }
 
-ordered_json answer_mixture(const InferRequest& in) {
-  const MixtureUpdate out = mixture_update(in.a, in.prior, in.psi[0], in.noise_sd[0], in.projection);
+ordered_json answer_mixture(const InferRequest& in, InferPrecision precision) {
+  const MixtureUpdate out = precision == InferPrecision::f32
+                                ? mixture_update_f32(in)
+                                : mixture_update(in.a, in.prior, in.psi[0], in.noise_sd[0], in.projection);
   return {{"responsibility", list(out.responsibility.p)},
           {"log_evidence", number(out.responsibility.log_evidence)},
           {"posterior", blocks(out.a, out.nig)},
           {"valid", out.valid}};
 }
 
-ordered_json answer_material(const InferRequest& in) {
+ordered_json answer_material(const InferRequest& in, InferPrecision precision) {
   const MaterialPosterior out = material_posterior(in.a, in.prior, in.psi, in.noise_sd, in.rho);
-  const MomentMatchedView view = moment_matched_view(out, in.prior, total_concentration(in.a) + double(in.psi.size()));
+  MaterialView shown{out.belief.p, out.belief.log_evidence,
+                     moment_matched_view(out, in.prior, total_concentration(in.a) + double(in.psi.size()))};
+  // Noisy readings are no statistics that planes could hold: a map computes them in f64 too.
+  const bool exact = std::all_of(in.noise_sd.begin(), in.noise_sd.end(), [](double sd) { return sd == 0; });
+  if (precision == InferPrecision::f32 && exact && !in.psi.empty()) shown = material_view_f32(in);
   ordered_json classes = ordered_json::array();
   for (size_t c = 0; c < in.prior.size(); ++c) {
     const MaterialClass& m = out.classes[c];
@@ -66,11 +73,11 @@ ordered_json answer_material(const InferRequest& in) {
                        {"next_scale2", number(m.next_here.scale2)},
                        {"next_dof", number(m.next_here.dof)}});
   }
-  return {{"class_probability", list(out.belief.p)},
-          {"surprise", number(out.belief.log_evidence)},
-          {"class_entropy", class_entropy(out.belief.p)},
+  return {{"class_probability", list(shown.p)},
+          {"surprise", number(shown.surprise)},
+          {"class_entropy", class_entropy(shown.p)},
           {"classes", classes},
-          {"posterior", blocks(view.a, view.nig)}};
+          {"posterior", blocks(shown.view.a, shown.view.nig)}};
 }
 
 // A value, or null beside the reason why there is none.
@@ -112,31 +119,12 @@ ordered_json answer_predict(const InferRequest& in) {
   return out;
 }
 
-// What a map's float planes would hold.
-void round_to_single(InferRequest& in) {
-  const auto rounded = [](double x, const char* field) {
-    const double single = double(float(x));
-    const bool lost =
-        !std::isfinite(single) || (x != 0 && std::abs(single) < double(std::numeric_limits<float>::min()));
-    if (lost)
-      throw FormatError(std::string(field) + ": expected a number in the range of single precision, found one outside");
-    return single;
-  };
-  for (double& x : in.a) x = rounded(x, "prior.a");
-  for (double& x : in.psi) x = rounded(x, "psi");
-  for (double& x : in.noise_sd) x = rounded(x, "sigma");
-  for (Nig& p : in.prior) {
-    p = {rounded(p.tau, "prior.tau"), rounded(p.kappa, "prior.kappa"), rounded(p.beta, "prior.beta"),
-         rounded(p.gamma, "prior.gamma")};
-  }
-}
-
-ordered_json answer(const InferRequest& in) {
+ordered_json answer(const InferRequest& in, InferPrecision precision) {
   switch (in.model) {
     case InferRequest::Model::mixture:
-      return answer_mixture(in);
+      return answer_mixture(in, precision);
     case InferRequest::Model::material:
-      return answer_material(in);
+      return answer_material(in, precision);
     case InferRequest::Model::predict:
       break;
   }
@@ -147,9 +135,7 @@ ordered_json answer(const InferRequest& in) {
 
 InferAnswer infer_json_line(std::string_view line, size_t number_of_line, InferPrecision precision) {
   try {
-    InferRequest request = parse_infer_request(line);
-    if (precision == InferPrecision::f32) round_to_single(request);
-    return {answer(request).dump(), false};
+    return {answer(parse_infer_request(line), precision).dump(), false};
   } catch (const Error& e) {
     const ordered_json error{{"error", e.what()}, {"line", number_of_line}};
     return {error.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace), true};

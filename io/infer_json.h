@@ -6,8 +6,8 @@
 
 namespace felt {
 
-/// f64: numbers as given. f32: priors and readings rounded to the single precision that a map stores, then the same
-/// scalar arithmetic.
+/// f64: the scalar functions that specify the models. f32: the batch kernels that a map runs, on the chosen SIMD target
+/// (io/infer_single.h); `classes` of `material`, noisy readings of `material` and `predict` are f64 in a map too.
 enum class InferPrecision { f64, f32 };
 
 /// One answer of `feltmap infer`.

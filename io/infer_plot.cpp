@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
+#include "inference/dirichlet.h"
 #include "inference/material.h"
 #include "inference/mixture.h"
+#include "inference/noise.h"
 #include "inference/priors.h"
 #include "io/infer_request.h"
 
@@ -42,7 +45,23 @@ double normal_density(const PlugInNormal& n, double x) {
   return n.weight * std::exp(-0.5 * z * z) / (n.sd * std::sqrt(2 * M_PI));
 }
 
-Plot panel(const Densities& d, const std::string& title, const std::vector<double>& readings, double low, double high) {
+/// The next reading after one reading of a mixture before it is projected: sum_j r_j of the product in which class j
+/// owns the reading.
+struct ExactMixture {
+  StudentTMixture next;
+  ExactMixture(const InferRequest& in, const ClassPosterior& responsibility) {
+    const double total = total_concentration(in.a) + 1;
+    for (size_t c = 0; c < in.prior.size(); ++c) {
+      const double r = responsibility.p[c];
+      next.weight.insert(next.weight.end(), {responsibility.not_p[c] * in.a[c] / total, r * (in.a[c] + 1) / total});
+      next.component.push_back(predictive(in.prior[c]));
+      next.component.push_back(predictive(noisy_update(in.prior[c], in.psi[0], in.noise_sd[0]).posterior));
+    }
+  }
+};
+
+Plot panel(const Densities& d, const std::string& title, const std::vector<double>& readings, double low, double high,
+           const std::optional<ExactMixture>& exact = {}) {
   Plot plot;
   plot.title = title;
   plot.x_label = "reading";
@@ -61,11 +80,15 @@ Plot panel(const Densities& d, const std::string& title, const std::vector<doubl
           [&](double at) { return d.next.weight[c] * pdf(d.next.component[c], at); });
   }
   curve("all classes", -1, PlotSeries::Style::line, [&](double at) { return pdf(d.next, at); });
-  curve("plug-in normal", -1, PlotSeries::Style::dashed, [&](double at) {
-    double sum = 0;
-    for (const PlugInNormal& n : d.plug_in) sum += normal_density(n, at);
-    return sum;
-  });
+  if (exact) {
+    curve("before projection", -1, PlotSeries::Style::dashed, [&](double at) { return pdf(exact->next, at); });
+  } else {
+    curve("plug-in normal", -1, PlotSeries::Style::dashed, [&](double at) {
+      double sum = 0;
+      for (const PlugInNormal& n : d.plug_in) sum += normal_density(n, at);
+      return sum;
+    });
+  }
   for (double reading : readings) {
     char label[32];
     std::snprintf(label, sizeof label, "%.4g", reading);
@@ -80,9 +103,13 @@ std::vector<Plot> infer_plots(std::string_view line, const std::string& title) {
   const InferRequest in = parse_infer_request(line);
   const Densities before = densities(in.a, in.prior, in.names);
   Densities after = before;
+  std::optional<ExactMixture> exact;
+  std::string outcome = ": after";
   if (in.model == InferRequest::Model::mixture) {
     const MixtureUpdate out = mixture_update(in.a, in.prior, in.psi[0], in.noise_sd[0], in.projection);
     if (out.valid) after = densities(out.a, out.nig, in.names);
+    if (!out.valid) outcome = ": published moments are no prior, state kept";
+    if (std::all_of(in.prior.begin(), in.prior.end(), has_prior)) exact.emplace(in, out.responsibility);
   } else if (in.model == InferRequest::Model::material) {
     const MaterialPosterior out = material_posterior(in.a, in.prior, in.psi, in.noise_sd, in.rho);
     std::vector<Nig> nig;
@@ -96,7 +123,8 @@ std::vector<Plot> infer_plots(std::string_view line, const std::string& title) {
     low = std::min(low, reading);
     high = std::max(high, reading);
   }
-  return {panel(before, title + ": before", in.psi, low, high), panel(after, title + ": after", in.psi, low, high)};
+  return {panel(before, title + ": before", in.psi, low, high),
+          panel(after, title + outcome, in.psi, low, high, exact)};
 }
 
 }  // namespace felt

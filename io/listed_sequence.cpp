@@ -8,7 +8,9 @@
 #include "core/pose.h"
 #include "io/camera_file.h"
 #include "io/image_decode.h"
+#include "io/probability_images.h"
 #include "io/registration.h"
+#include "io/sequence_fingerprint.h"
 #include "io/text_input.h"
 #include "io/trajectory_file.h"
 
@@ -64,6 +66,9 @@ public:
 
   const SequenceInfo& info() const override { return info_; }
   int64_t size() const override { return int64_t(listing_.frames.size()); }
+  FrameName name(int64_t i) const override {
+    return {listing_.frames[size_t(i)].index, listing_.frames[size_t(i)].stamp_s};
+  }
   ReadResult read(int64_t i) const override;
 
 private:
@@ -72,14 +77,15 @@ private:
   DepthImage read_depth(const ImageSource& source) const;
   ColorImage read_color(const ImageSource& source, const DepthImage& depth_m) const;
   Image<uint16_t> read_ids(const ImageSource& source, const std::string& kind, const DepthImage& depth_m) const;
-  ProbabilityImage read_probabilities(const ImageSource& source) const;
+  Image<uint16_t> read_masks(const std::vector<ImageSource>& masks, const DepthImage& depth_m) const;
+  ProbabilityImage read_probabilities(const ImageSource& source, const LabelImage& labels) const;
   ProbabilityImage read_class_maps(const FrameRecord& frame) const;
   PinholeCamera camera_of_color_grid(int width, int height) const;
   bool on_depth_grid(int width, int height) const;
 
   SequenceListing listing_;
   SequenceInfo info_;
-  bool with_color_;
+  bool with_color_, with_instances_;
   Image<float> z_per_ray_length_;  ///< empty where depth lies along the optical axis
 };
 
@@ -91,7 +97,10 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   info_.pose_convention = to_string(listing_.pose_convention);
   info_.classes = listing_.classes;
   info_.notes = listing_.notes;
+  info_.properties_file = listing_.properties_file;
+  info_.touches_file = listing_.touches_file;
   info_.recorded_frames = int64_t(listing_.frames.size());
+  info_.fingerprint = fingerprint(listing_);
   find_camera(path);
 
   std::vector<FrameRecord> selected;
@@ -106,7 +115,8 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   info_.has_color = with_color_;
   info_.has_labels = any([](const FrameRecord& f) { return !f.labels.empty(); });
   info_.has_probabilities = any([](const FrameRecord& f) { return !f.probabilities.empty() || !f.class_maps.empty(); });
-  info_.has_instances = any([](const FrameRecord& f) { return !f.instances.empty(); });
+  with_instances_ = options.read_instances;
+  info_.has_instances = any([](const FrameRecord& f) { return !f.instances.empty() || !f.masks.empty(); });
 
   if (listing_.depth_is_ray_length) {
     z_per_ray_length_ = Image<float>(info_.camera.width, info_.camera.height);
@@ -159,9 +169,11 @@ ReadResult ListedSequence::read(int64_t i) const {
     frame.depth_m = read_depth(record.depth);
     if (with_color_) frame.color = read_color(record.color, frame.depth_m);
     if (!record.labels.empty()) frame.labels = read_ids(record.labels, "label", frame.depth_m);
-    if (!record.instances.empty()) frame.instances = read_ids(record.instances, "instance", frame.depth_m);
+    if (with_instances_ && !record.instances.empty())
+      frame.instances = read_ids(record.instances, "instance", frame.depth_m);
+    if (with_instances_ && !record.masks.empty()) frame.instances = read_masks(record.masks, frame.depth_m);
     if (!record.probabilities.empty())
-      frame.probabilities = read_probabilities(record.probabilities);
+      frame.probabilities = read_probabilities(record.probabilities, frame.labels);
     else if (!record.class_maps.empty())
       frame.probabilities = read_class_maps(record);
     return frame;
@@ -256,52 +268,72 @@ Image<uint16_t> ListedSequence::read_ids(const ImageSource& source, const std::s
                                        info_.camera, listing_.T_color_depth, kNoLabel);
 }
 
-ProbabilityImage ListedSequence::read_probabilities(const ImageSource& source) const {
-  const Image<uint16_t> stack = decoded(source, "probability", decode_gray16);
-  const int width = info_.camera.width, height = info_.camera.height, planes = stack.height() / height;
+Image<uint16_t> ListedSequence::read_masks(const std::vector<ImageSource>& masks, const DepthImage& depth_m) const {
+  // Where masks overlap the smaller one is on top: a cup on its table. A soft mask counts from half of its peak.
+  struct Mask {
+    Image<uint16_t> image;
+    uint16_t least, number;
+    int64_t area;
+  };
+  std::vector<Mask> all;
+  for (const ImageSource& source : masks) {
+    if (all.size() + 1 == kNoLabel) throw Skip{"too many masks", source.path.parent_path().string()};
+    Mask mask{read_ids(source, "mask", depth_m), 1, uint16_t(all.size() + 1), 0};
+    for (uint16_t& value : mask.image)
+      if (value == kNoLabel) value = 0;  // outside the labelled image
+    mask.least = uint16_t(std::max(1, (*std::max_element(mask.image.begin(), mask.image.end()) + 1) / 2));
+    mask.area =
+        std::count_if(mask.image.begin(), mask.image.end(), [&](uint16_t value) { return value >= mask.least; });
+    all.push_back(std::move(mask));
+  }
+  std::stable_sort(all.begin(), all.end(), [](const Mask& a, const Mask& b) { return a.area > b.area; });
+  Image<uint16_t> instances(info_.camera.width, info_.camera.height, 0);
+  for (const Mask& mask : all)
+    for (size_t p = 0; p < instances.size(); ++p)
+      if (mask.image.data()[p] >= mask.least) instances.data()[p] = mask.number;
+  return instances;
+}
+
+/// What the values of a probability image are out of: 255 or 65535.
+float full_scale(std::span<const uint8_t> bytes, const std::string& where) {
+  return read_image_header(bytes, where).bits > 8 ? 65535.0f : 255.0f;
+}
+
+ProbabilityImage ListedSequence::read_probabilities(const ImageSource& source, const LabelImage& labels) const {
+  const int width = info_.camera.width, height = info_.camera.height;
+  float scale = 1;
+  const Image<uint16_t> stack =
+      decoded(source, "probability", [&](std::span<const uint8_t> bytes, const std::string& where) {
+        scale = full_scale(bytes, where);
+        return decode_gray16(bytes, where);
+      });
+  if (stack.width() == width && stack.height() == height && !labels.empty())
+    return probabilities_of_confidence(labels, stack, scale);
   if (stack.width() != width || stack.height() % (2 * height) != 0)
-    throw Skip{
-        "wrong-size probability image",
-        describe_mismatch(source.path.string(), "size", std::to_string(width) + " x 2 m " + std::to_string(height),
-                          size_text(stack.width(), stack.height()))};
-  ProbabilityImage image{width, height, planes / 2, {}, {}};
-  const size_t pixels = size_t(width) * height, top = size_t(image.top);
-  image.class_id.resize(pixels * top);
-  image.probability.resize(pixels * top);
-  for (size_t m = 0; m < top; ++m)
-    for (size_t p = 0; p < pixels; ++p) {
-      image.class_id[p * top + m] = stack.data()[m * pixels + p];
-      image.probability[p * top + m] = float(stack.data()[(top + m) * pixels + p]) / 65535.0f;
-    }
-  return image;
+    throw Skip{"wrong-size probability image",
+               describe_mismatch(source.path.string(), "size",
+                                 std::to_string(width) + " x 2 m " + std::to_string(height) + " for the m best, or " +
+                                     size_text(width, height) + " for the confidence of label images",
+                                 size_text(stack.width(), stack.height()))};
+  return probabilities_of_stack(stack, height);
 }
 
 ProbabilityImage ListedSequence::read_class_maps(const FrameRecord& frame) const {
-  const int width = info_.camera.width, height = info_.camera.height;
-  const size_t pixels = size_t(width) * height, top = frame.class_maps.size() + 1;
-  ProbabilityImage image{width, height, int(top), std::vector<uint16_t>(pixels * top),
-                         std::vector<float>(pixels * top)};
-  for (size_t m = 1; m < top; ++m) {
-    const auto& [class_id, source] = frame.class_maps[m - 1];
-    const Image<uint16_t> map = decoded(source, "probability", decode_gray16);
-    if (map.width() != width || map.height() != height)
+  std::vector<DecodedClassMap> maps;
+  for (const ClassMap& map : frame.class_maps) {
+    float scale = 1;
+    Image<uint16_t> values =
+        decoded(map.image, "probability", [&](std::span<const uint8_t> bytes, const std::string& where) {
+          scale = full_scale(bytes, where);
+          return decode_gray16(bytes, where);
+        });
+    if (values.width() != info_.camera.width || values.height() != info_.camera.height)
       throw Skip{"wrong-size probability image",
-                 describe_mismatch(source.path.string(), "size", size_text(width, height),
-                                   size_text(map.width(), map.height()))};
-    for (size_t p = 0; p < pixels; ++p) {
-      image.class_id[p * top + m] = class_id;
-      image.probability[p * top + m] = float(map.data()[p]) / 65535.0f;
-    }
+                 describe_mismatch(map.image.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
+                                   size_text(values.width(), values.height()))};
+    maps.push_back({map.class_id, std::move(values), map.score / scale});
   }
-  // Maps of single classes need not sum to one: class 0 takes what is missing, an excess is scaled away.
-  for (size_t p = 0; p < pixels; ++p) {
-    float* const probability = &image.probability[p * top];
-    float sum = 0;
-    for (size_t m = 1; m < top; ++m) sum += probability[m];
-    probability[0] = std::max(0.0f, 1 - sum);
-    for (size_t m = 1; m < top && sum > 1; ++m) probability[m] /= sum;
-  }
-  return image;
+  return joined_class_maps(maps, listing_.classes.known(0));
 }
 
 }  // namespace

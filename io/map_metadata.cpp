@@ -29,9 +29,11 @@ const std::string kTextPrefix = "text/";
 
 json classes_to_json(const ClassTable& table) {
   json rows = json::array();
-  for (const ClassInfo& c : table.classes())
+  for (const ClassInfo& c : table.classes()) {
     rows.push_back(
         {{"id", c.id}, {"name", c.name}, {"color", {c.color.r, c.color.g, c.color.b}}, {"ignore", c.ignore}});
+    if (c.prior != 1) rows.back()["prior"] = c.prior;
+  }
   return rows;
 }
 
@@ -42,10 +44,14 @@ ClassTable classes_from_json(const json& rows) {
     classes.push_back({row.at("id").get<uint16_t>(),
                        row.at("name").get<std::string>(),
                        {color.at(0).get<uint8_t>(), color.at(1).get<uint8_t>(), color.at(2).get<uint8_t>()},
-                       row.at("ignore").get<bool>()});
+                       row.at("ignore").get<bool>(),
+                       row.value("prior", 1.0)});
   }
   return classes.empty() ? ClassTable() : ClassTable(std::move(classes));
 }
+
+/// A count in a file takes memory that the file's size does not justify: 80 MB at most. 92 hours at 30 frames a second.
+constexpr int64_t kMostFrames = 10'000'000;
 
 /// Frames as [first, step, count] triples: a recording that was fused whole is one triple.
 json frames_to_json(const std::vector<int64_t>& frames) {
@@ -61,8 +67,6 @@ json frames_to_json(const std::vector<int64_t>& frames) {
 }
 
 std::vector<int64_t> frames_from_json(const json& triples) {
-  // A journal is small; a count beyond this is damage that would allocate without bound.
-  constexpr int64_t kMostFrames = 100'000'000;
   std::vector<int64_t> frames;
   for (const json& triple : triples) {
     const auto first = triple.at(0).get<int64_t>(), step = triple.at(1).get<int64_t>(),
@@ -70,6 +74,7 @@ std::vector<int64_t> frames_from_json(const json& triples) {
     if (count < 0 || count + int64_t(frames.size()) > kMostFrames || std::abs(first) > INT32_MAX ||
         std::abs(step) > INT32_MAX)
       throw FormatError("frame numbers out of range");
+    frames.reserve(frames.size() + size_t(count));
     for (int64_t i = 0; i < count; ++i) frames.push_back(first + i * step);
   }
   return frames;
@@ -121,6 +126,9 @@ auto parsed(const openvdb::MetaMap& metadata, const char* key, const std::string
 }  // namespace
 
 openvdb::MetaMap to_metadata(const Map& map, const std::string& hash) {
+  if (frame_count(map.frames) > size_t(kMostFrames))
+    throw FormatError(describe_mismatch("map", "frames in the journal", "at most " + std::to_string(kMostFrames),
+                                        std::to_string(frame_count(map.frames))));
   openvdb::MetaMap metadata;
   metadata.insertMeta(kFormat, openvdb::Int32Metadata(int32_t(kMapFileVersion)));
   metadata.insertMeta("creator", openvdb::StringMetadata("feltmap"));

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/pose.h"
+#include "io/camera_file.h"
 
 namespace felt {
 
@@ -21,10 +22,18 @@ ViewMask read_view_mask(const std::filesystem::path& file, const std::vector<dou
     image.release();
   }
   if (image.empty()) throw FormatError(describe_mismatch(file.string(), "mask", "an image", "something else"));
+  const auto size_text = [](double w, double h) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%.0f x %.0f", w, h);
+    return std::string(text);
+  };
+  if (intrinsics.size() == 6 && (intrinsics[4] != image.cols || intrinsics[5] != image.rows))
+    throw FormatError(describe_mismatch(file.string(), "size of the mask",
+                                        size_text(intrinsics[4], intrinsics[5]) + " as its camera",
+                                        size_text(image.cols, image.rows)));
   ViewMask view;
   view.camera = {intrinsics.at(0), intrinsics.at(1), intrinsics.at(2), intrinsics.at(3), image.cols, image.rows};
-  if (!(view.camera.fx > 0) || !(view.camera.fy > 0))
-    throw ConfigError(describe_mismatch("--intrinsics", "focal lengths", "positive numbers", "others"));
+  check_camera_fits_image(view.camera, file.string());
   const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> recorded(pose.data());
   if (pose.size() != 16 || rigid_pose(recorded, view.T_world_camera) != PoseFault::none)
     throw ConfigError(describe_mismatch("--pose", "matrix", "a rigid transform", "another"));

@@ -1,9 +1,14 @@
 #include "io/open_sequence.h"
 
+#include <map>
+#include <utility>
+
 #include "core/error.h"
 #include "io/class_table_file.h"
 #include "io/layouts.h"
+#include "io/layouts/file_names.h"
 #include "io/listed_sequence.h"
+#include "io/probability_images.h"
 #include "io/side_images.h"
 
 namespace felt {
@@ -45,6 +50,37 @@ SequenceListing list_sequence(const fs::path& path, const SequenceOptions& optio
   return listing;
 }
 
+/// The table that lies with a folder of label images: in it, or beside it under its name (`material/` and
+/// `classes_material.csv`). Empty where there is none.
+fs::path table_of_labels(const fs::path& folder) {
+  const fs::path clean = (folder / "").lexically_normal().parent_path();
+  if (const fs::path inside = first_existing(clean, {"classes.yaml", "classes.csv"}); !inside.empty()) return inside;
+  const std::string name = clean.filename().string();
+  return first_existing(clean.parent_path(), {"classes_" + name + ".yaml", "classes_" + name + ".csv"});
+}
+
+/// The table that was given, else that of the labels that were given, else the sequence's own. Probability maps that
+/// the layout found keep their classes by name.
+void choose_class_table(const SequenceOptions& options, SequenceListing& listing) {
+  fs::path file = options.classes_file;
+  if (file.empty() && !options.labels_dir.empty()) file = table_of_labels(options.labels_dir);
+  if (file.empty()) return;
+  const ClassTable own = std::exchange(listing.classes, read_class_table(file));
+  if (!options.probs_dir.empty()) return;
+  std::map<uint16_t, uint16_t> id_in_table;
+  for (const ClassInfo& theirs : own.classes())
+    for (const ClassInfo& ours : listing.classes.classes())
+      if (ours.name == theirs.name) id_in_table[theirs.id] = ours.id;
+  for (FrameRecord& frame : listing.frames)
+    for (ClassMap& map : frame.class_maps) {
+      const auto found = id_in_table.find(map.class_id);
+      if (found == id_in_table.end())
+        throw ConfigError(describe_mismatch(file.string(), "class of " + map.image.path.filename().string(),
+                                            "a class of that name", "none"));
+      map.class_id = found->second;
+    }
+}
+
 void apply_options(const SequenceOptions& options, SequenceListing& listing) {
   if (options.intrinsics) listing.intrinsics = options.intrinsics;
   if (options.depth_scale) listing.depth_scale = *options.depth_scale;
@@ -54,9 +90,14 @@ void apply_options(const SequenceOptions& options, SequenceListing& listing) {
   if (!(listing.depth_scale > 0 && listing.depth_scale < 1e9))
     throw ConfigError(
         describe_mismatch("depth scale", "units per metre", "a number above 0", std::to_string(listing.depth_scale)));
-  if (!options.classes_file.empty()) listing.classes = read_class_table(options.classes_file);
+  choose_class_table(options, listing);
   if (!options.labels_dir.empty()) attach_labels(options.labels_dir, listing);
   if (!options.probs_dir.empty()) attach_probabilities(options.probs_dir, listing);
+  if (!options.instances_dir.empty()) attach_instances(options.instances_dir, listing);
+  if (listing.classes.empty() && !(options.labels_dir.empty() && options.probs_dir.empty()))
+    throw ConfigError(describe_mismatch((options.labels_dir.empty() ? options.probs_dir : options.labels_dir).string(),
+                                        "class table",
+                                        "one in the folder, beside it, in the sequence, or by --classes FILE", "none"));
 }
 
 }  // namespace

@@ -49,6 +49,53 @@ void write_label_png(const fs::path& path, const LabelImage& labels) {
   write_encoded(path, cv::Mat(labels.height(), labels.width(), CV_16UC1, const_cast<uint16_t*>(labels.data())));
 }
 
+void write_level_png(const fs::path& path, const Image<float>& values, double low, double high) {
+  cv::Mat levels(values.height(), values.width(), CV_16UC1);
+  for (int v = 0; v < values.height(); ++v)
+    for (int u = 0; u < values.width(); ++u) {
+      const double share = std::clamp((double(values(u, v)) - low) / (high - low), 0.0, 1.0);
+      levels.at<uint16_t>(v, u) = std::isfinite(values(u, v)) ? uint16_t(std::lround(1 + 65534 * share)) : uint16_t(0);
+    }
+  write_encoded(path, levels);
+}
+
+ColorImage colored(const Image<float>& values, double low, double high) {
+  // Lightness grows evenly, so that the picture also reads in grey and for colour-blind eyes.
+  constexpr double kStops[][3] = {{68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {253, 231, 37}};
+  constexpr int kLast = int(std::size(kStops)) - 1;
+  ColorImage picture(values.width(), values.height(), {255, 255, 255, 255});
+  for (size_t i = 0; i < values.size(); ++i) {
+    const double value = double(values.data()[i]);
+    if (!std::isfinite(value)) continue;
+    const double at = std::clamp((value - low) / (high - low), 0.0, 1.0) * kLast;
+    const int stop = std::min(int(at), kLast - 1);
+    const auto channel = [&](int c) {
+      return uint8_t(std::lround(kStops[stop][c] + (at - stop) * (kStops[stop + 1][c] - kStops[stop][c])));
+    };
+    picture.data()[i] = {channel(0), channel(1), channel(2), 255};
+  }
+  return picture;
+}
+
+ColorImage colored(const LabelImage& labels, const ClassTable& classes) {
+  ColorImage picture(labels.width(), labels.height(), {255, 255, 255, 255});
+  for (size_t i = 0; i < labels.size(); ++i)
+    if (const uint16_t slot = classes.slot_of_id(labels.data()[i]); slot != ClassTable::kNoSlot)
+      picture.data()[i] = classes.at_slot(slot).color;
+  return picture;
+}
+
+ColorImage colored(const Image<Eigen::Vector3f>& normals) {
+  ColorImage picture(normals.width(), normals.height(), {255, 255, 255, 255});
+  for (size_t i = 0; i < normals.size(); ++i) {
+    const Eigen::Vector3f& n = normals.data()[i];
+    if (n.isZero()) continue;
+    const Eigen::Vector3f level = (n + Eigen::Vector3f::Ones()) * 127.5f + Eigen::Vector3f::Constant(0.5f);
+    picture.data()[i] = {uint8_t(level.x()), uint8_t(level.y()), uint8_t(level.z()), 255};
+  }
+  return picture;
+}
+
 ColorImage overview_picture(const TriangleMesh& mesh, const Eigen::Vector3d& up, int panel_width, int panel_height) {
   struct Direction {
     double azimuth_deg, elevation_deg;

@@ -21,6 +21,12 @@ struct SkippedFrame {
 
 using ReadResult = std::variant<Frame, SkippedFrame>;
 
+/// Which frame of the recording stands at a position of the selection.
+struct FrameName {
+  int64_t index = 0;   ///< frame number
+  double stamp_s = 0;  ///< recorded time, or the index where none is recorded
+};
+
 /// What is known of a sequence before its first frame is decoded.
 struct SequenceInfo {
   std::string layout;          ///< "7scenes", "tum", ...
@@ -29,8 +35,10 @@ struct SequenceInfo {
   double depth_scale = 0;      ///< stored depth units per metre
   std::string pose_convention;
   bool has_color = false, has_labels = false, has_probabilities = false, has_instances = false;
-  ClassTable classes;              ///< empty where the sequence brings none
-  int64_t recorded_frames = 0;     ///< before the selection of frames
+  ClassTable classes;                                   ///< empty where the sequence brings none
+  std::filesystem::path properties_file, touches_file;  ///< that the sequence carries; empty where it has none
+  int64_t recorded_frames = 0;                          ///< before the selection of frames
+  std::string fingerprint;         ///< of the recording, wherever it lies and whatever of it is selected
   std::vector<std::string> notes;  ///< what was assumed or repaired, one sentence each
 };
 
@@ -42,6 +50,8 @@ public:
   virtual const SequenceInfo& info() const = 0;
   /// Number of selected frames.
   virtual int64_t size() const = 0;
+  /// Number and stamp of the frame at a position, without decoding it.
+  virtual FrameName name(int64_t i) const = 0;
   /// Frame at position 0 <= i < size() in recorded order. Never throws for a bad frame.
   virtual ReadResult read(int64_t i) const = 0;
 };

@@ -89,6 +89,17 @@ void read_intrinsics_value(std::optional<Intrinsics>& target, const YAML::Node& 
   target = parse_intrinsics(text, where);
 }
 
+/// "a,b" or a list of names.
+void read_names(std::vector<std::string>& target, const YAML::Node& value, const std::string& where) {
+  target.clear();
+  if (value.IsSequence()) {
+    for (const YAML::Node& name : value) target.push_back(text_of(name, where, "names of classes"));
+  } else {
+    const std::string text = text_of(value, where, "names of classes");
+    for (const std::string_view name : split_words(text, ',')) target.emplace_back(name);
+  }
+}
+
 std::map<std::string, ReadValue> readers_of(ReconstructConfig& c, const fs::path& folder) {
   return {
       {"labels", path_into(c.labels, folder)},
@@ -125,6 +136,17 @@ std::map<std::string, ReadValue> readers_of(ReconstructConfig& c, const fs::path
                                                      {"inverse-square", WeightModel::inverse_square},
                                                      {"sensor-noise", WeightModel::sensor_noise}})},
       {"carve", flag_into(c.carve)},
+      {"label_band", number_into(c.label_settings.band_vox, 0, false)},
+      {"label_evidence", number_into(c.label_settings.evidence, 0, false)},
+      {"label_cap", number_into(c.label_settings.max_evidence, 0, true)},
+      {"label_novelty", number_into(c.label_settings.novelty_m, 0, true)},
+      {"label_turn", number_into(c.label_settings.novelty_deg, 0, true)},
+      {"class_prior", number_into(c.label_settings.class_prior, 0, false)},
+      {"confusion", path_into(c.label_settings.confusion, folder)},
+      {"ignore_classes", [&c](const YAML::Node& value,
+                              const std::string& where) { read_names(c.label_settings.ignore_classes, value, where); }},
+      {"instances", flag_into(c.label_settings.instances)},
+      {"spread_rest", flag_into(c.label_settings.spread_rest)},
       {"threads",
        [&c](const YAML::Node& value, const std::string& where) {
          const std::string text = text_of(value, where, "a whole number from 1 to 1024");

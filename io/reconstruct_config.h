@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "io/label_settings.h"
 #include "io/sequence_options.h"
 #include "mapping/integration_config.h"
 
@@ -29,6 +30,7 @@ struct ReconstructConfig {
   std::optional<DistanceModel> distance;
   std::optional<WeightModel> weight;
   std::optional<bool> carve;
+  LabelSettings label_settings;
   std::optional<int> threads;
 };
 

@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "core/class_table.h"
@@ -23,16 +22,24 @@ struct ImageSource {
   bool empty() const { return path.empty(); }
 };
 
+/// A probability image of one class, or one detection of it: values times `score`.
+struct ClassMap {
+  uint16_t class_id = 0;
+  ImageSource image;
+  float score = 1;
+};
+
 /// One frame as the layout found it: names and a pose, nothing decoded.
 struct FrameRecord {
   int64_t index = 0;   ///< frame number
   double stamp_s = 0;  ///< or the index where none is recorded
   ImageSource depth, color, labels, instances;
-  ImageSource probabilities;                                 ///< stacked top-m image (io/layouts.h)
-  std::vector<std::pair<uint16_t, ImageSource>> class_maps;  ///< a probability image per class id; class 0: the rest
-  std::optional<Eigen::Matrix4d> pose;                       ///< as recorded; absent: read from `pose_file`
-  std::filesystem::path pose_file;                           ///< empty and no `pose`: the frame has none
-  std::string fault, fault_detail;                           ///< why the layout already knows that it cannot be used
+  ImageSource probabilities;            ///< stacked top-m image, or confidence of the labels (io/probability_images.h)
+  std::vector<ClassMap> class_maps;     ///< probability images of single classes; class 0: the rest
+  std::vector<ImageSource> masks;       ///< one thing each, instead of `instances`
+  std::optional<Eigen::Matrix4d> pose;  ///< as recorded; absent: read from `pose_file`
+  std::filesystem::path pose_file;      ///< empty and no `pose`: the frame has none
+  std::string fault, fault_detail;      ///< why the layout already knows that it cannot be used
 };
 
 /// A sequence as plain data: what every layout produces and one reader decodes.
@@ -48,6 +55,7 @@ struct SequenceListing {
   bool depth_is_ray_length = false;
   PoseConvention pose_convention;
   ClassTable classes;
+  std::filesystem::path properties_file, touches_file;  ///< empty: the sequence carries none
   std::vector<std::string> notes;
 };
 

@@ -44,14 +44,16 @@ struct SequenceOptions {
   FrameSelection frames{};                 ///< positions in recorded order
   std::filesystem::path labels_dir{};      ///< label images, stems are frame numbers
   std::filesystem::path probs_dir{};       ///< probability maps
+  std::filesystem::path instances_dir{};   ///< instance images, or folders of masks
   std::filesystem::path classes_file{};    ///< classes.yaml
   std::optional<Intrinsics> intrinsics{};  ///< of the depth image
   std::optional<double> depth_scale{};     ///< stored depth units per metre
   std::optional<DepthEncoding> depth_encoding{};
   std::optional<bool> depth_is_ray_length{};  ///< depth along the pixel's ray instead of along the optical axis
   std::optional<PoseConvention> pose_convention{};
-  double max_dt_s = 0.02;  ///< largest difference of stamps within one frame
-  bool read_color = true;  ///< false: colour is not decoded, and frames without it are whole
+  double max_dt_s = 0.02;      ///< largest difference of stamps within one frame
+  bool read_color = true;      ///< false: colour is not decoded, and frames without it are whole
+  bool read_instances = true;  ///< false: instance images are not decoded
 };
 
 }  // namespace felt

@@ -1,9 +1,11 @@
 #include "io/side_images.h"
 
+#include <algorithm>
 #include <map>
 
 #include "core/error.h"
 #include "io/layouts/file_names.h"
+#include "io/text_input.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -15,14 +17,14 @@ struct NamedImages {
   std::map<int64_t, fs::path> by_number;
 };
 
-NamedImages images_in(const fs::path& folder) {
+NamedImages images_in(const fs::path& folder, bool folders) {
   std::error_code fault;
   fs::directory_iterator files(folder, fault);
   if (fault) throw IoError(describe_mismatch(folder.string(), "folder", "a readable folder", fault.message()));
   NamedImages images;
   std::map<int64_t, int> uses;
   for (const fs::directory_entry& entry : files) {
-    if (entry.path().extension() != ".png") continue;
+    if (entry.path().extension() != ".png" && !(folders && entry.is_directory())) continue;
     const std::string stem = entry.path().stem().string();
     images.by_stem[stem] = entry.path();
     if (const auto number = trailing_number(stem.substr(0, stem.find('.')))) {
@@ -35,8 +37,24 @@ NamedImages images_in(const fs::path& folder) {
   return images;
 }
 
-void attach(const fs::path& folder, SequenceListing& listing, ImageSource FrameRecord::*member, const char* what) {
-  const NamedImages images = images_in(folder);
+/// PNG images of a folder by name, numbers within names in their order.
+std::vector<ImageSource> masks_in(const fs::path& folder) {
+  std::vector<ImageSource> masks;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == ".png") masks.push_back({.path = entry.path()});
+  const auto key = [](const ImageSource& mask) {
+    const std::string stem = mask.path.stem().string();
+    return std::pair(parse_integer(stem).value_or(-1), stem);
+  };
+  std::sort(masks.begin(), masks.end(), [&](const auto& a, const auto& b) { return key(a) < key(b); });
+  return masks;
+}
+
+}  // namespace
+
+void attach_images(const fs::path& folder, SequenceListing& listing, ImageSource FrameRecord::*member,
+                   const char* what, bool folders) {
+  const NamedImages images = images_in(folder, folders);
   bool any = false;
   for (FrameRecord& frame : listing.frames) {
     fs::path& path = (frame.*member).path;
@@ -55,14 +73,18 @@ void attach(const fs::path& folder, SequenceListing& listing, ImageSource FrameR
                           std::to_string(images.by_stem.size()) + " PNG images, none of them of a frame"));
 }
 
-}  // namespace
-
 void attach_labels(const fs::path& folder, SequenceListing& listing) {
-  attach(folder, listing, &FrameRecord::labels, "labels");
+  attach_images(folder, listing, &FrameRecord::labels, "labels");
 }
 
-void attach_probabilities(const fs::path& folder, SequenceListing& listing) {
-  attach(folder, listing, &FrameRecord::probabilities, "probabilities");
+void attach_instances(const fs::path& folder, SequenceListing& listing) {
+  attach_images(folder, listing, &FrameRecord::instances, "instances", /*folders=*/true);
+  for (FrameRecord& frame : listing.frames) {
+    frame.masks.clear();
+    if (frame.instances.empty() || !fs::is_directory(frame.instances.path)) continue;
+    frame.masks = masks_in(frame.instances.path);
+    frame.instances = {};
+  }
 }
 
 }  // namespace felt

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -95,32 +96,65 @@ Eigen::Vector3d point_under(const Frame& frame, const Eigen::Vector2d& uv) {
   return frame.T_world_camera * (frame.camera.ray(uv.x(), uv.y()) * depth);
 }
 
-TouchRequest request_of(const RecordedTouch& touch, const TouchRequest& defaults, const TouchedSequence* sequence) {
-  TouchRequest request = defaults;
+std::string seconds_text(double seconds) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.6f", seconds);
+  return text;
+}
+
+/// The place of a touch's frame among the sequence's: that with its number, or the one nearest to its stamp.
+size_t place_of(const RecordedTouch& touch, const TouchedSequence& sequence) {
+  const std::vector<FrameName>& frames = sequence.frames;
+  const auto outside = [&](const char* what, const std::string& first, const std::string& last,
+                           const std::string& found) {
+    throw TouchError(describe_mismatch("touch", what, "one of the sequence, " + first + " to " + last, found));
+  };
+  if (touch.frame) {
+    const auto at =
+        std::find_if(frames.begin(), frames.end(), [&](const FrameName& f) { return f.index == *touch.frame; });
+    const auto [first, last] = std::minmax_element(
+        frames.begin(), frames.end(), [](const FrameName& a, const FrameName& b) { return a.index < b.index; });
+    if (at == frames.end())
+      outside("frame", std::to_string(first->index), std::to_string(last->index), std::to_string(*touch.frame));
+    return size_t(at - frames.begin());
+  }
+  const auto [first, last] = std::minmax_element(
+      frames.begin(), frames.end(), [](const FrameName& a, const FrameName& b) { return a.stamp_s < b.stamp_s; });
+  constexpr double kRoundingS = 1e-6;  // stamps are written with as many digits
+  const double stamp_s = *touch.stamp_s;
+  if (!(stamp_s >= first->stamp_s - kRoundingS && stamp_s <= last->stamp_s + kRoundingS))
+    outside("stamp", seconds_text(first->stamp_s), seconds_text(last->stamp_s), seconds_text(stamp_s));
+  const auto distance = [&](const FrameName& f) { return std::abs(f.stamp_s - stamp_s); };
+  const auto nearest = std::min_element(
+      frames.begin(), frames.end(), [&](const FrameName& a, const FrameName& b) { return distance(a) < distance(b); });
+  return size_t(nearest - frames.begin());
+}
+
+/// What a recorded touch asks of the map.
+struct Resolved {
+  TouchRequest request;
+  std::optional<ViewMask> view;  ///< for the rule `mask`
+};
+
+Resolved resolved(const RecordedTouch& touch, const TouchRequest& defaults, const TouchedSequence* sequence) {
+  Resolved out{defaults, std::nullopt};
+  TouchRequest& request = out.request;
   request.property = touch.property;
   request.value = touch.value;
   request.sigma = touch.sigma;
-  request.stamp_s = touch.stamp_s ? *touch.stamp_s : double(*touch.frame);
   if (touch.point_m) request.point_m = *touch.point_m;
   if (sequence == nullptr) {
+    request.stamp_s = touch.stamp_s ? *touch.stamp_s : double(*touch.frame);
     if (!touch.point_m) throw TouchError("touch: expected a world point x, y, z, found a pixel without its sequence");
-    return request;
+    return out;
   }
-  const auto outside = [&](auto found, auto first, auto last, const char* what) {
-    if (found >= first && found <= last) return;
-    throw TouchError(describe_mismatch("touch", what,
-                                       "one of the sequence, " + std::to_string(first) + " to " + std::to_string(last),
-                                       std::to_string(found)));
-  };
-  if (touch.frame)
-    outside(*touch.frame, sequence->first_frame, sequence->last_frame, "frame");
-  else
-    outside(*touch.stamp_s, sequence->first_stamp_s, sequence->last_stamp_s, "stamp");
-  if (touch.point_m) return request;
-  const std::optional<Frame> frame = sequence->frame_of(touch);
+  request.stamp_s = stamp_of(touch, *sequence);
+  if (touch.point_m) return out;
+  const std::optional<Frame> frame = sequence->read(place_of(touch, *sequence));
   if (!frame) throw TouchError("touch: expected a readable frame at its stamp, found none");
   request.point_m = point_under(*frame, *touch.pixel);
-  return request;
+  if (request.region.rule == RegionRule::mask) out.view = segment_mask(*frame, *touch.pixel, sequence->segments);
+  return out;
 }
 
 }  // namespace
@@ -161,13 +195,30 @@ std::vector<RecordedTouch> read_touches(const std::filesystem::path& file) {
   return parse_touches(text, file.string());
 }
 
+TouchedSequence touched_sequence(const SequenceReader& reader) {
+  TouchedSequence sequence;
+  for (int64_t i = 0; i < reader.size(); ++i) sequence.frames.push_back(reader.name(i));
+  sequence.read = [&reader](size_t place) -> std::optional<Frame> {
+    ReadResult result = reader.read(int64_t(place));
+    if (Frame* frame = std::get_if<Frame>(&result)) return std::move(*frame);
+    return std::nullopt;
+  };
+  return sequence;
+}
+
+double stamp_of(const RecordedTouch& touch, const TouchedSequence& sequence) {
+  const size_t place = place_of(touch, sequence);
+  return touch.stamp_s ? *touch.stamp_s : sequence.frames[place].stamp_s;
+}
+
 std::vector<TouchOutcome> apply_recorded_touches(Map& map, const std::vector<RecordedTouch>& touches,
                                                  const TouchRequest& defaults, const TouchedSequence* sequence) {
   std::vector<TouchOutcome> outcomes;
   for (const RecordedTouch& touch : touches) {
     TouchOutcome outcome{touch, std::nullopt, ""};
     try {
-      outcome.effect = apply_touch(map, resolve_touch(map, request_of(touch, defaults, sequence)));
+      const Resolved asked = resolved(touch, defaults, sequence);
+      outcome.effect = apply_touch(map, resolve_touch(map, asked.request, asked.view ? &*asked.view : nullptr));
     } catch (const Error& error) {
       outcome.refused = error.what();
     }

@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "core/frame.h"
+#include "io/reader.h"
+#include "io/segmentation/segment_source.h"
 #include "mapping/touch_update.h"
 
 namespace felt {
@@ -31,11 +32,18 @@ std::vector<RecordedTouch> parse_touches(const std::string& text, const std::str
 
 /// The sequence that touches were recorded with.
 struct TouchedSequence {
-  double first_stamp_s = 0, last_stamp_s = 0;
-  int64_t first_frame = 0, last_frame = 0;
-  /// The frame with this number, or the one nearest to a stamp; nothing where it cannot be read.
-  std::function<std::optional<Frame>(const RecordedTouch&)> frame_of;
+  std::vector<FrameName> frames;  ///< every recorded frame; not empty
+  /// The frame at a place of `frames`; nothing where it cannot be read.
+  std::function<std::optional<Frame>(size_t)> read;
+  /// What the region rule `mask` takes a touch's region from, where it is given by frame and pixel.
+  SegmentSource segments = SegmentSource::geometric;
 };
+/// `reader` must outlive what is returned.
+TouchedSequence touched_sequence(const SequenceReader& reader);
+
+/// When a touch was recorded, seconds: its stamp, or that of its frame. Throws TouchError where it is not within the
+/// sequence.
+double stamp_of(const RecordedTouch& touch, const TouchedSequence& sequence);
 
 /// What became of one recorded touch.
 struct TouchOutcome {
@@ -47,7 +55,8 @@ struct TouchOutcome {
 /// Applies recorded touches to a map at their stamps. Touch state is a function of vision counts and journal, so they
 /// are all applied when the frames are fused: each region is then found in the complete map, and it makes no difference
 /// when in the sequence a touch came. `defaults` gives what a row does not say (model, region settings, ...); without a
-/// `sequence` a row needs a point, and a frame number stands for its stamp. A touch that cannot be applied leaves the
+/// `sequence` a row needs a point, and a frame number stands for its stamp. With the region rule `mask` the region of a
+/// touch given by frame and pixel is the frame's segment under that pixel. A touch that cannot be applied leaves the
 /// map as it was and says why; the others count.
 std::vector<TouchOutcome> apply_recorded_touches(Map& map, const std::vector<RecordedTouch>& touches,
                                                  const TouchRequest& defaults, const TouchedSequence* sequence);

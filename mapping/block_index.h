@@ -6,43 +6,59 @@
 #include <vector>
 
 #include "mapping/block_store.h"
+#include "mapping/region.h"
 
 namespace felt {
 
-/// A read-only second index over the blocks of a store, for rays: two levels of 8^3, so that a ray steps over a cell of
-/// 8^3 absent blocks at once and finds the next block without hashing. Valid until blocks are added.
+/// A read-only second index over the blocks of a store, for rays: two levels of 8^3, so that a ray steps over a group
+/// of 8^3 absent blocks at once and finds the next block without hashing; and for each block the cells that the surface
+/// can cross. Cell (x, y, z) is the cube between voxel centres x and x + 1 and so on: its corners may lie in up to
+/// eight blocks. Valid until the map changes.
 class BlockIndex {
 public:
   static constexpr uint32_t kNone = BlockStore::kNone;
 
+  /// 8^3 blocks, by offset_in_block of their coordinates.
+  struct Group {
+    std::array<uint32_t, kBlockVoxels> block;     ///< number in the store, or kNone
+    std::array<uint32_t, kBlockVoxels> crossing;  ///< number of its mask, or kNone where no cell is crossed
+  };
+
   /// Parallel. A voxel counts as observed from `min_weight` on.
   BlockIndex(const BlockStore& store, float min_weight);
 
-  /// One cell of 8^3 blocks: the block's number, or kNone.
-  using Cell = std::array<uint32_t, kBlockVoxels>;
-
-  /// The cell that holds a block, or nothing.
-  const Cell* cell(const BlockCoord& block) const {
-    const auto found = cells_.find(block_of_voxel(block));
-    return found == cells_.end() ? nullptr : &children_[found->second];
+  /// The group with these coordinates (those of its blocks / 8), or nothing.
+  const Group* group(const Index3& coord) const {
+    if (dense_.empty()) {
+      const auto found = groups_.find(coord);
+      return found == groups_.end() ? nullptr : &children_[found->second];
+    }
+    const uint32_t x = uint32_t(coord.x - first_.x), y = uint32_t(coord.y - first_.y), z = uint32_t(coord.z - first_.z);
+    if (x >= size_[0] || y >= size_[1] || z >= size_[2]) return nullptr;
+    const uint32_t child = dense_[(size_t(x) * size_[1] + y) * size_[2] + z];
+    return child == kNone ? nullptr : &children_[child];
   }
   uint32_t find(const BlockCoord& block) const {
-    const Cell* c = cell(block);
-    return c == nullptr ? kNone : (*c)[size_t(offset_in_block(block))];
+    const Group* g = group(block_of_voxel(block));
+    return g == nullptr ? kNone : g->block[size_t(offset_in_block(block))];
   }
-  /// Whether the surface can pass through a block, or between it and its neighbours: it or one of the 26 around it has
-  /// an observed voxel behind the surface.
-  bool near_surface(uint32_t block) const { return near_surface_[block] != 0; }
+  /// Cells whose corners were all observed and lie on both sides of the surface, by offset of their first voxel.
+  const BlockMask& mask(uint32_t crossing) const { return masks_[crossing]; }
 
   /// Box of all blocks; low > high where there is none.
   const BlockCoord& low() const { return low_; }
   const BlockCoord& high() const { return high_; }
 
 private:
+  BlockMask crossed_cells(const BlockStore& store, uint32_t block, float min_weight) const;
+
   BlockCoord low_{0, 0, 0}, high_{-1, -1, -1};
-  std::unordered_map<Index3, uint32_t> cells_;
-  std::vector<Cell> children_;
-  std::vector<uint8_t> near_surface_;
+  std::unordered_map<Index3, uint32_t> groups_;
+  Index3 first_;  ///< group at the beginning of `dense_`
+  std::array<uint32_t, 3> size_{};
+  std::vector<uint32_t> dense_;  ///< groups of the whole box, where it is not too large
+  std::vector<Group> children_;
+  std::vector<BlockMask> masks_;
 };
 
 }  // namespace felt

@@ -66,6 +66,17 @@ ColorPlanes& BlockStore::add_color(Block& block) {
   return *block.color;
 }
 
+InstancePlanes& BlockStore::add_instance(Block& block) {
+  if (block.instance == nullptr) {
+    {
+      const std::lock_guard lock(planes_guard_->mutex);
+      block.instance = instance_.allocate();
+    }
+    std::memset(block.instance, 0, sizeof(InstancePlanes));
+  }
+  return *block.instance;
+}
+
 Plane* BlockStore::new_plane() {
   Plane* plane;
   {

@@ -35,6 +35,12 @@ struct EvidencePlane {
   Plane* counts = nullptr;
 };
 
+/// Which thing a voxel belongs to, by majority vote (Boyer and Moore 1991) over instance images, 2 KiB.
+struct alignas(64) InstancePlanes {
+  uint16_t id[kBlockVoxels];     ///< 0: none was seen
+  uint16_t votes[kBlockVoxels];  ///< lead of that id over all others; 0 with an id: none leads
+};
+
 /// Readings of one property that cover the voxels of a block: how many, their mean, and their squared deviations from
 /// it.
 struct TouchPlanes {
@@ -50,7 +56,13 @@ struct Block {
   GeometryPlanes* geometry = nullptr;  ///< never null
   ColorPlanes* color = nullptr;
   std::vector<EvidencePlane> evidence;  ///< ascending slot; only classes seen in this block
-  std::vector<TouchPlanes> touch;       ///< ascending property; only properties touched in this block
+  /// Evidence that all k classes share evenly: what top-m probabilities do not name (null: none). Class i has
+  /// concentration prior_i + counts_i + even / k.
+  Plane* even_evidence = nullptr;
+  InstancePlanes* instance = nullptr;
+  std::vector<TouchPlanes> touch;  ///< ascending property; only properties touched in this block
+
+  bool has_evidence() const { return !evidence.empty() || even_evidence != nullptr; }
 };
 
 /// Owner of every plane of a map, indexed by block coordinates. Blocks keep their number (order of creation) and their
@@ -78,6 +90,8 @@ public:
   uint32_t find_or_create(const BlockCoord& coord);
   /// The colour planes of a block, created where absent. Not thread-safe.
   ColorPlanes& add_color(Block& block);
+  /// The instance planes of a block, zeros where they are new. Thread-safe for distinct blocks.
+  InstancePlanes& add_instance(Block& block);
   /// A plane of zeros that lives as long as the store. Thread-safe, so that the one task of a block can add what it
   /// needs.
   Plane* new_plane();
@@ -88,6 +102,7 @@ public:
   /// Heap bytes of geometry planes, block records and index (no colour, no classes).
   size_t geometry_bytes() const;
   size_t color_bytes() const { return color_.bytes(); }
+  size_t instance_bytes() const { return instance_.bytes(); }
   size_t plane_bytes() const { return planes_.bytes(); }
 
 private:
@@ -120,6 +135,7 @@ private:
   std::vector<uint32_t> table_;  ///< open addressing, linear probing, at most half full
   Arena<GeometryPlanes> geometry_;
   Arena<ColorPlanes> color_;
+  Arena<InstancePlanes> instance_;
   Arena<Plane> planes_;
   std::shared_ptr<Guard> planes_guard_ = make_guard();
   static std::shared_ptr<Guard> make_guard();

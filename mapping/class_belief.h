@@ -1,20 +1,28 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "core/class_table.h"
 #include "mapping/block_store.h"
 
 namespace felt {
 
-/// What vision says about the class of one voxel: the Dirichlet's mean with one prior count a class.
+/// What vision says about the class of one voxel: the Dirichlet's mean.
 struct ClassBelief {
   uint16_t slot = ClassTable::kNoSlot;  ///< most probable class, the lowest slot of equals; kNoSlot without evidence
   float probability = 0;                ///< of that class
   float entropy = 0;                    ///< of the class probabilities, nats
 };
 
-/// `classes`: k. Counts are above the prior, alpha_i = 1 + count_i.
-ClassBelief class_belief(const Block& block, int offset, int classes);
+/// alpha_i = prior_i + count_i + even / k of one voxel by slot (INFERENCE section 1), into k numbers. A null block
+/// holds the prior.
+void class_concentration(const Block* block, int offset, const ClassTable& classes, std::span<double> alpha);
+
+ClassBelief class_belief(const Block& block, int offset, const ClassTable& classes);
+
+/// Sum of the evidence of one voxel, without the prior.
+float total_evidence(const Block& block, int offset);
 
 }  // namespace felt

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "core/error.h"
-#include "mapping/mesh_distance.h"
 
 namespace felt {
 namespace {
@@ -68,7 +67,16 @@ bool sees(const ObservingCameras& c, const Eigen::Isometry3d& T_world_camera, co
   return scene.first_hit(origin, direction, limit).triangle == TriangleTree::kNone;
 }
 
-/// Drops the samples that no camera sees.
+SurfaceSamples samples_of(const TriangleMesh& mesh, const GeometryOptions& options, const char* which) {
+  SurfaceSamples samples = sample_surface(mesh, options.samples, options.seed);
+  if (samples.positions.empty())
+    throw Error(describe_mismatch("evaluation", which, "triangles with area",
+                                  std::to_string(mesh.triangles.size()) + " triangles without"));
+  return samples;
+}
+
+}  // namespace
+
 SurfaceSamples seen_samples(const SurfaceSamples& samples, const ObservingCameras& cameras, const TriangleTree& scene) {
   std::vector<uint8_t> seen(samples.positions.size());
   tbb::parallel_for(size_t(0), seen.size(), [&](size_t i) {
@@ -86,19 +94,9 @@ SurfaceSamples seen_samples(const SurfaceSamples& samples, const ObservingCamera
   return kept;
 }
 
-SurfaceSamples samples_of(const TriangleMesh& mesh, const GeometryOptions& options, const char* which) {
-  SurfaceSamples samples = sample_surface(mesh, options.samples, options.seed);
-  if (samples.positions.empty())
-    throw Error(describe_mismatch("evaluation", which, "triangles with area",
-                                  std::to_string(mesh.triangles.size()) + " triangles without"));
-  return samples;
-}
-
-}  // namespace
-
 GeometryScores evaluate_geometry(const TriangleMesh& reconstruction, const TriangleMesh& reference,
                                  const GeometryOptions& options, const ObservingCameras* cameras) {
-  const SurfaceSamples ours = samples_of(reconstruction, options, "reconstruction");
+  SurfaceSamples ours = samples_of(reconstruction, options, "reconstruction");
   SurfaceSamples truth = samples_of(reference, options, "reference mesh");
   const TriangleTree our_tree(reconstruction), truth_tree(reference);
   GeometryScores scores;
@@ -108,6 +106,13 @@ GeometryScores evaluate_geometry(const TriangleMesh& reconstruction, const Trian
     if (truth.positions.empty())
       throw Error(describe_mismatch("evaluation", "reference mesh", "a part that some camera sees", "none"));
     scores.reference_seen = double(truth.positions.size()) / all;
+    if (options.cull_reconstruction) {
+      const auto before = double(ours.positions.size());
+      ours = seen_samples(ours, *cameras, truth_tree);
+      if (ours.positions.empty())
+        throw Error(describe_mismatch("evaluation", "reconstruction", "a part that some camera sees", "none"));
+      scores.reconstruction_seen = double(ours.positions.size()) / before;
+    }
   }
   const Nearest accuracy = nearest_on(ours, reference, truth_tree),
                 completion = nearest_on(truth, reconstruction, our_tree);

@@ -7,6 +7,7 @@
 
 #include "core/camera.h"
 #include "core/mesh.h"
+#include "mapping/mesh_distance.h"
 
 namespace felt {
 
@@ -22,14 +23,18 @@ struct GeometryOptions {
   size_t samples = 200000;  ///< on each mesh
   uint64_t seed = 1;
   double threshold_m = 0.05;  ///< of completion ratio, precision, recall and F-score
+  /// With cameras: samples of the reconstruction that none of them sees, in front of or on the reference, do not count
+  /// either.
+  bool cull_reconstruction = false;
 };
 
 /// Distances in metres between area-uniform samples of one mesh and the nearest point of the other's triangles.
 struct GeometryScores {
   size_t samples_reconstruction = 0;
-  size_t samples_reference = 0;  ///< that some camera saw, where cameras were given; else all
-  double reference_seen = 1;     ///< share of the reference's samples that some camera saw
-  double accuracy_mean_m = 0;    ///< reconstruction to reference
+  size_t samples_reference = 0;    ///< that some camera saw, where cameras were given; else all
+  double reference_seen = 1;       ///< share of the reference's samples that some camera saw
+  double reconstruction_seen = 1;  ///< share of the reconstruction's samples that count
+  double accuracy_mean_m = 0;      ///< reconstruction to reference
   double accuracy_median_m = 0;
   double accuracy_rms_m = 0;
   double completion_mean_m = 0;  ///< reference to reconstruction
@@ -40,10 +45,13 @@ struct GeometryScores {
   double normal_consistency = 0;  ///< mean |n . n'| of triangle normals at nearest points, mean of both directions
 };
 
+/// The samples that some camera sees: in its image, within its depth range, and first on their ray against `scene`.
+SurfaceSamples seen_samples(const SurfaceSamples& samples, const ObservingCameras& cameras, const TriangleTree& scene);
+
 /// Compares a reconstruction with a reference mesh of the same frame (world, metres). With cameras, samples of the
 /// reference count only where some camera sees them: in the image, within its depth range, first on their ray (against
-/// the reference itself). Samples of the reconstruction all count. Throws Error where a mesh has no area or no camera
-/// sees the reference.
+/// the reference itself). Samples of the reconstruction all count, unless `cull_reconstruction`. Throws Error where a
+/// mesh has no area or no camera sees the reference.
 GeometryScores evaluate_geometry(const TriangleMesh& reconstruction, const TriangleMesh& reference,
                                  const GeometryOptions& options = {}, const ObservingCameras* cameras = nullptr);
 

@@ -14,7 +14,7 @@ double ratio(uint64_t part, uint64_t whole) { return whole > 0 ? double(part) / 
 
 /// Mean of `score` over classes that occur in the truth.
 template <typename Score>
-double mean_over_present(const ConfusionMatrix& m, Score score) {
+double mean_over_present(const LabelCounts& m, Score score) {
   double sum = 0;
   int present = 0;
   for (int c = 0; c < m.classes(); ++c) {
@@ -27,49 +27,77 @@ double mean_over_present(const ConfusionMatrix& m, Score score) {
 
 }  // namespace
 
-void ConfusionMatrix::add(int truth, int predicted) {
+void LabelCounts::add(int truth, int predicted) {
   if (truth < 0 || truth >= classes_) return;
   const int column = predicted >= 0 && predicted < classes_ ? predicted : classes_;
   ++counts_[size_t(truth * (classes_ + 1) + column)];
 }
 
-uint64_t ConfusionMatrix::total() const {
+uint64_t LabelCounts::total() const {
   uint64_t sum = 0;
   for (const uint64_t n : counts_) sum += n;
   return sum;
 }
 
-double ConfusionMatrix::pixel_accuracy() const {
+double LabelCounts::pixel_accuracy() const {
   uint64_t correct = 0;
   for (int c = 0; c < classes_; ++c) correct += count(c, c);
   return ratio(correct, total());
 }
 
-double ConfusionMatrix::recall(int c) const {
+double LabelCounts::recall(int c) const {
   uint64_t row = 0;
   for (int p = 0; p <= classes_; ++p) row += count(c, p);
   return ratio(count(c, c), row);
 }
 
-double ConfusionMatrix::precision(int c) const {
+double LabelCounts::precision(int c) const {
   uint64_t column = 0;
   for (int t = 0; t < classes_; ++t) column += count(t, c);
   return ratio(count(c, c), column);
 }
 
-double ConfusionMatrix::iou(int c) const {
+double LabelCounts::iou(int c) const {
   uint64_t either = 0;
   for (int p = 0; p <= classes_; ++p) either += count(c, p);
   for (int t = 0; t < classes_; ++t) either += t == c ? 0 : count(t, c);
   return ratio(count(c, c), either);
 }
 
-double ConfusionMatrix::mean_recall() const {
+double LabelCounts::mean_recall() const {
   return mean_over_present(*this, [&](int c) { return recall(c); });
 }
 
-double ConfusionMatrix::mean_iou() const {
+double LabelCounts::mean_iou() const {
   return mean_over_present(*this, [&](int c) { return iou(c); });
+}
+
+double LabelCounts::mean_iou_of_all() const {
+  double sum = 0;
+  int classes = 0;
+  for (int c = 0; c < classes_; ++c) {
+    if (std::isnan(iou(c))) continue;
+    sum += iou(c);
+    ++classes;
+  }
+  return classes > 0 ? sum / classes : kNone;
+}
+
+LabelCounts& LabelCounts::operator+=(const LabelCounts& other) {
+  assert(classes_ == other.classes_);
+  for (size_t i = 0; i < counts_.size(); ++i) counts_[i] += other.counts_[i];
+  return *this;
+}
+
+CalibrationScores& CalibrationScores::operator+=(const CalibrationScores& other) {
+  for (int i = 0; i < kBins; ++i) {
+    bins_[i].count += other.bins_[i].count;
+    bins_[i].confidence_sum += other.bins_[i].confidence_sum;
+    bins_[i].correct += other.bins_[i].correct;
+  }
+  count_ += other.count_, refused_ += other.refused_;
+  brier_sum_ += other.brier_sum_, nll_sum_ += other.nll_sum_;
+  return *this;
 }
 
 void CalibrationScores::add(std::span<const double> probability, int truth) {
@@ -125,6 +153,35 @@ void PropertyScores::add(double truth, double mean, double log_density, std::spa
   for (size_t i = 0; i < kIntervals.size(); ++i)
     covered_[i] += truth >= quantile(0.5 - kIntervals[i] / 2) && truth <= quantile(0.5 + kIntervals[i] / 2);
 }
+
+void PropertyScores::add(double truth, const StudentTMixture& forecast) {
+  constexpr int kLevels = 200;
+  std::array<double, kLevels> quantiles;
+  for (int i = 0; i < kLevels; ++i)
+    quantiles[size_t(i)] = quantile(forecast, (i + 0.5) / kLevels).value_or(location(forecast));
+  add(truth, location(forecast), log_pdf(forecast, truth), quantiles);
+}
+
+void ClassImageScores::add(const Image<float>& probability, const Image<float>& truth) {
+  ++images_;
+  pixels_ += truth.size();
+  for (size_t i = 0; i < truth.size(); ++i) {
+    const double d = double(probability.data()[i]) - double(truth.data()[i]);
+    square_sum_ += d * d;
+  }
+  ssim_sum_ += felt::ssim(probability, truth);
+  entropy_sum_ += felt::binary_cross_entropy(probability, truth) * double(truth.size());
+}
+
+ClassImageScores& ClassImageScores::operator+=(const ClassImageScores& other) {
+  images_ += other.images_, pixels_ += other.pixels_;
+  square_sum_ += other.square_sum_, ssim_sum_ += other.ssim_sum_, entropy_sum_ += other.entropy_sum_;
+  return *this;
+}
+
+double ClassImageScores::psnr_db() const { return 10 * std::log10(double(pixels_) / square_sum_); }
+
+double ClassImageScores::ssim() const { return ssim_sum_ / double(images_); }
 
 double psnr_db(const Image<float>& a, const Image<float>& b) {
   assert(a.width() == b.width() && a.height() == b.height());

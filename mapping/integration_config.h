@@ -2,6 +2,8 @@
 
 namespace felt {
 
+struct LabelEvidence;
+
 /// What a depth pixel says about the signed distance of a voxel at camera depth z on its ray.
 enum class DistanceModel {
   optical_axis,   ///< d - z
@@ -25,6 +27,12 @@ struct LabelConfig {
   float evidence = 1.0f;       ///< what one observation adds: below 1 tempers correlated frames
   float max_evidence = 0.0f;   ///< cap of a voxel's total evidence; older evidence fades beyond it; 0: no cap
   bool spread_dropped = true;  ///< of top-m probabilities: what the kept classes lack goes to the others evenly
+  /// A view adds `evidence` in full where the camera moved this far, or turned this much, from every earlier view, and
+  /// in proportion less where it is nearer to one: near-identical views repeat their mistakes. 0: every view in full.
+  float novelty_m = 0.0f, novelty_deg = 0.0f;
+  bool instances = false;  ///< also vote for the instance ids of voxels
+  /// What a label says about the true class (mapping/label_evidence.h); null: what it says. Must outlive the fusion.
+  const LabelEvidence* likelihood = nullptr;
 };
 
 /// Settings of depth fusion that do not change between frames.

@@ -16,6 +16,14 @@ size_t active_voxel_count(const Map& map) {
   return n;
 }
 
+size_t class_bytes(const Map& map) {
+  size_t bytes = 0;
+  for (const Block& block : map.store.blocks())
+    bytes += (block.evidence.size() + (block.even_evidence != nullptr ? 1 : 0)) * sizeof(Plane) +
+             block.evidence.capacity() * sizeof(EvidencePlane);
+  return bytes;
+}
+
 std::string map_hash(const Map& map) {
   // Blocks are hashed in parallel and their digests in canonical order.
   const std::vector<uint32_t> order = map.store.sorted();
@@ -34,6 +42,17 @@ std::string map_hash(const Map& map) {
     for (const EvidencePlane& e : block.evidence) {
       XXH3_128bits_update(&state, &e.slot, sizeof e.slot);
       XXH3_128bits_update(&state, e.counts, sizeof *e.counts);
+    }
+    // Each with a mark of its own, so that no plane can pass for another.
+    if (block.even_evidence != nullptr) {
+      constexpr uint16_t kMark = 0xfffe;
+      XXH3_128bits_update(&state, &kMark, sizeof kMark);
+      XXH3_128bits_update(&state, block.even_evidence, sizeof *block.even_evidence);
+    }
+    if (block.instance != nullptr) {
+      constexpr uint16_t kMark = 0xfffd;
+      XXH3_128bits_update(&state, &kMark, sizeof kMark);
+      XXH3_128bits_update(&state, block.instance, sizeof *block.instance);
     }
     for (const TouchPlanes& t : block.touch) {
       XXH3_128bits_update(&state, &t.property, sizeof t.property);

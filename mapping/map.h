@@ -35,6 +35,9 @@ float sample_tsdf(const Map& map, double x, double y, double z, float min_weight
 /// Number of voxels with weight > 0.
 size_t active_voxel_count(const Map& map);
 
+/// Heap bytes of the classes' evidence: planes and what lists them.
+size_t class_bytes(const Map& map);
+
 /// Hash (XXH3, 128 bits, hex) of every stored value and its coordinate in canonical order: equal for equal maps,
 /// whatever the number of threads, the order of block creation, or the layout of a file. Blocks that hold nothing do
 /// not count.

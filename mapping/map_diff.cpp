@@ -82,12 +82,18 @@ std::vector<std::string> different_settings(const Map& a, const Map& b) {
 
 struct Channels {
   Accumulator tsdf{"tsdf", "m"}, weight{"weight", ""}, color{"color", "grey levels"},
-      color_count{"color_count", "observations"};
+      color_count{"color_count", "observations"}, even_evidence{"evidence_even", "counts"},
+      instance{"instance", "ids that differ"};
   struct Evidence {
     std::optional<int> slot_a, slot_b;
     Accumulator sums;
   };
   std::vector<Evidence> evidence;
+  struct Touched {
+    std::optional<int> property_a, property_b;
+    Accumulator n, mean, m2;
+  };
+  std::vector<Touched> touched;
 };
 
 Channels make_channels(const Map& a, const Map& b) {
@@ -98,6 +104,18 @@ Channels make_channels(const Map& a, const Map& b) {
   for (const std::string& name : names)
     channels.evidence.push_back(
         {a.classes.slot_of_name(name), b.classes.slot_of_name(name), {"evidence/" + name, "counts"}});
+  std::set<std::string> properties;
+  for (const Map* map : {&a, &b})
+    if (map->touches.any_active())
+      for (int p = 0; p < map->properties.size(); ++p) properties.insert(map->properties[p].name);
+  for (const std::string& name : properties) {
+    const std::string prefix = "touch/" + name + "/";
+    channels.touched.push_back({a.properties.index_of(name),
+                                b.properties.index_of(name),
+                                {prefix + "n", "readings"},
+                                {prefix + "mean", "unit"},
+                                {prefix + "m2", "unit^2"}});
+  }
   return channels;
 }
 
@@ -125,13 +143,64 @@ void compare_color(const Block* a, const Block* b, Channels& channels) {
   }
 }
 
-void compare_evidence(const Block* a, const Block* b, Channels::Evidence& channel) {
-  const Plane* ea = evidence_of(a, channel.slot_a);
-  const Plane* eb = evidence_of(b, channel.slot_b);
-  if (ea == nullptr && eb == nullptr) return;
+void compare_planes(const Plane* a, const Plane* b, Accumulator& channel) {
+  if (a == nullptr && b == nullptr) return;
   for (int i = 0; i < kBlockVoxels; ++i) {
-    const float va = ea != nullptr ? ea->value[i] : 0, vb = eb != nullptr ? eb->value[i] : 0;
-    channel.sums.add(va != 0, vb != 0, va, vb);
+    const float va = a != nullptr ? a->value[i] : 0, vb = b != nullptr ? b->value[i] : 0;
+    channel.add(va != 0, vb != 0, va, vb);
+  }
+}
+
+void compare_evidence(const Block* a, const Block* b, Channels::Evidence& channel) {
+  compare_planes(evidence_of(a, channel.slot_a), evidence_of(b, channel.slot_b), channel.sums);
+}
+
+void compare_instances(const Block* a, const Block* b, Accumulator& channel) {
+  const InstancePlanes* pa = a != nullptr ? a->instance : nullptr;
+  const InstancePlanes* pb = b != nullptr ? b->instance : nullptr;
+  if (pa == nullptr && pb == nullptr) return;
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    const int ia = pa != nullptr ? pa->id[i] : 0, ib = pb != nullptr ? pb->id[i] : 0;
+    channel.add(ia != 0, ib != 0, ia != ib, 0);
+  }
+}
+
+const TouchPlanes* touch_planes_of(const Block* block, std::optional<int> property) {
+  if (block == nullptr || !property) return nullptr;
+  for (const TouchPlanes& planes : block->touch)
+    if (planes.property == *property) return &planes;
+  return nullptr;
+}
+
+void compare_touched(const Block* a, const Block* b, Channels::Touched& channel) {
+  const TouchPlanes* ta = touch_planes_of(a, channel.property_a);
+  const TouchPlanes* tb = touch_planes_of(b, channel.property_b);
+  if (ta == nullptr && tb == nullptr) return;
+  const auto compare = [&](Plane* const TouchPlanes::*plane, Accumulator& sums) {
+    for (int i = 0; i < kBlockVoxels; ++i)
+      sums.add(ta != nullptr && ta->n->value[i] > 0, tb != nullptr && tb->n->value[i] > 0,
+               ta != nullptr ? (ta->*plane)->value[i] : 0, tb != nullptr ? (tb->*plane)->value[i] : 0);
+  };
+  compare(&TouchPlanes::n, channel.n);
+  compare(&TouchPlanes::mean, channel.mean);
+  compare(&TouchPlanes::m2, channel.m2);
+}
+
+void compare_journals(const TouchJournal& a, const TouchJournal& b, MapDifference& result) {
+  const auto active = [](const Touch* touch) { return touch != nullptr && !touch->undone; };
+  for (const Touch& touch : b.touches) result.touches_only_b += active(&touch) && !active(a.find(touch.id));
+  for (const Touch& touch : a.touches) {
+    if (!active(&touch)) continue;
+    const Touch* other = b.find(touch.id);
+    if (!active(other)) {
+      ++result.touches_only_a;
+      continue;
+    }
+    ++result.touches_both;
+    if (touch.region == other->region) continue;
+    ++result.regions_changed;
+    result.region_voxels_changed +=
+        subtracted(touch.region, other->region).voxels() + subtracted(other->region, touch.region).voxels();
   }
 }
 
@@ -165,11 +234,23 @@ MapDifference difference(const Map& a, const Map& b) {
     compare_geometry(in_a, in_b, channels);
     compare_color(in_a, in_b, channels);
     for (Channels::Evidence& channel : channels.evidence) compare_evidence(in_a, in_b, channel);
+    compare_planes(in_a != nullptr ? in_a->even_evidence : nullptr, in_b != nullptr ? in_b->even_evidence : nullptr,
+                   channels.even_evidence);
+    compare_instances(in_a, in_b, channels.instance);
+    for (Channels::Touched& channel : channels.touched) compare_touched(in_a, in_b, channel);
     result.class_flips += flips(a, b, in_a, in_b);
   }
   for (Accumulator* sums : {&channels.tsdf, &channels.weight, &channels.color, &channels.color_count})
     result.channels.push_back(sums->finish());
   for (Channels::Evidence& channel : channels.evidence) result.channels.push_back(channel.sums.finish());
+  // Most maps have neither: then there is nothing to say.
+  for (Accumulator* sums : {&channels.even_evidence, &channels.instance})
+    if (const ChannelDifference channel = sums->finish();
+        channel.voxels_both + channel.voxels_only_a + channel.voxels_only_b > 0)
+      result.channels.push_back(channel);
+  for (Channels::Touched& channel : channels.touched)
+    for (Accumulator* sums : {&channel.n, &channel.mean, &channel.m2}) result.channels.push_back(sums->finish());
+  compare_journals(a.touches, b.touches, result);
   return result;
 }
 
@@ -177,6 +258,7 @@ bool beyond(const MapDifference& difference, double tolerance) {
   if (!difference.comparable) return true;
   for (const std::string& line : difference.settings)
     if (!line.starts_with("frame journals")) return true;
+  if (difference.touches_only_a + difference.touches_only_b + difference.regions_changed > 0) return true;
   return std::any_of(difference.channels.begin(), difference.channels.end(), [&](const ChannelDifference& c) {
     return c.voxels_only_a != 0 || c.voxels_only_b != 0 || !(c.max_difference <= tolerance);
   });

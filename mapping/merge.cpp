@@ -117,6 +117,35 @@ void merge_evidence(std::span<const Block* const> from, BlockStore& store, Block
   }
 }
 
+void merge_even_evidence(std::span<const Block* const> from, BlockStore& store, Block& to) {
+  double sum[kBlockVoxels] = {};
+  bool any = false;
+  for (const Block* block : from) {
+    if (block->even_evidence == nullptr) continue;
+    any = true;
+    for (int i = 0; i < kBlockVoxels; ++i) sum[i] += block->even_evidence->value[i];
+  }
+  if (!any) return;
+  to.even_evidence = store.new_plane();
+  for (int i = 0; i < kBlockVoxels; ++i) to.even_evidence->value[i] = float(sum[i]);
+}
+
+/// The id with the most votes over all maps, and its lead over the other ids together; the smaller id of equals.
+void merge_instances(std::span<const Block* const> from, InstancePlanes& to) {
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    std::map<uint16_t, int> votes;
+    int all = 0;
+    for (const Block* block : from)
+      if (block->instance != nullptr && block->instance->id[i] != 0)
+        votes[block->instance->id[i]] += block->instance->votes[i], all += block->instance->votes[i];
+    if (votes.empty()) continue;
+    const auto most =
+        std::max_element(votes.begin(), votes.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    to.id[i] = most->first;
+    to.votes[i] = uint16_t(std::clamp(2 * most->second - all, 0, 0xffff));
+  }
+}
+
 /// Texts that all maps agree on keep their key; of others every distinct text is kept, numbered in ascending order.
 std::map<std::string, std::string> joined_texts(std::span<const Map* const> maps) {
   std::map<std::string, std::set<std::string>> texts;
@@ -154,6 +183,9 @@ Map merge(std::span<const Map* const> maps, const MergeOptions& options) {
     if (std::any_of(from.begin(), from.end(), [](const Block* b) { return b->color != nullptr; }))
       merge_color(from, result.store.add_color(to));
     merge_evidence(from, result.store, to);
+    merge_even_evidence(from, result.store, to);
+    if (std::any_of(from.begin(), from.end(), [](const Block* b) { return b->instance != nullptr; }))
+      merge_instances(from, result.store.add_instance(to));
   }
   rebuild_touch_planes(result);
   return result;

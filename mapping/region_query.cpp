@@ -7,9 +7,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <queue>
 
+#include "mapping/map_segments.h"
 #include "mapping/region_surface.h"
 
 namespace felt {
@@ -226,23 +228,54 @@ bool map_has_labels(const Map& map) {
                      [](const Block& b) { return !b.evidence.empty(); });
 }
 
-/// Strongest class of the surface band within two voxels of the contact, -1 where there is no evidence.
-int contact_class(const Map& map, const Index3& centre, const SurfaceRule& band) {
-  std::vector<double> sum(size_t(std::max(1, map.classes.size())), 0.0);
+/// Calls `visit(block, offset)` for the voxels of the surface band within two voxels of the contact.
+template <typename Visit>
+void for_each_near(const Map& map, const Index3& centre, const SurfaceRule& band, const Visit& visit) {
   for (int dx = -2; dx <= 2; ++dx)
     for (int dy = -2; dy <= 2; ++dy)
       for (int dz = -2; dz <= 2; ++dz) {
         const Index3 v{centre.x + dx, centre.y + dy, centre.z + dz};
         const Block* block = map.store.get(block_of_voxel(v));
         const int i = offset_in_block(v);
-        if (block == nullptr || block->geometry->weight[i] < band.min_weight ||
-            std::abs(block->geometry->tsdf[i]) > band.band_m)
-          continue;
-        for (const EvidencePlane& e : block->evidence)
-          if (e.slot < sum.size()) sum[e.slot] += e.counts->value[i];
+        if (block != nullptr && block->geometry->weight[i] >= band.min_weight &&
+            std::abs(block->geometry->tsdf[i]) <= band.band_m)
+          visit(*block, i);
       }
+}
+
+/// Strongest class there, -1 where there is no evidence.
+int contact_class(const Map& map, const Index3& centre, const SurfaceRule& band) {
+  std::vector<double> sum(size_t(std::max(1, map.classes.size())), 0.0);
+  for_each_near(map, centre, band, [&](const Block& block, int i) {
+    for (const EvidencePlane& e : block.evidence)
+      if (e.slot < sum.size()) sum[e.slot] += e.counts->value[i];
+  });
   const auto best = std::max_element(sum.begin(), sum.end());
   return *best > 0 ? int(best - sum.begin()) : -1;
+}
+
+/// The thing that most of these voxels belong to, the lowest id of equals. Throws TouchError where there is none.
+uint16_t contact_instance(const Map& map, const Index3& centre, const SurfaceRule& band) {
+  std::map<uint16_t, int> voxels;
+  for_each_near(map, centre, band, [&](const Block& block, int i) {
+    if (block.instance != nullptr && block.instance->votes[i] > 0) ++voxels[block.instance->id[i]];
+  });
+  voxels.erase(0);
+  const auto most =
+      std::max_element(voxels.begin(), voxels.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (most != voxels.end()) return most->first;
+  const bool any = std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
+                               [](const Block& b) { return b.instance != nullptr; });
+  throw TouchError(describe_mismatch("region instance", "contact",
+                                     any ? "a surface that belongs to a thing" : "a map with instance ids",
+                                     any ? "one without an instance id" : "none (reconstruct --instances)"));
+}
+
+/// The contact's segment of the map, cut to `within`.
+Region segment_around(const Map& map, const Contact& contact, const RegionSettings& settings, const Region& within) {
+  for (const Region& segment : map_segments(map, map_segment_settings(settings)))
+    if (segment.contains(contact.voxel)) return intersected(segment, within);
+  throw TouchError("region segment: contact: expected a surface that is part of a segment, found a piece too small");
 }
 
 /// Says what is at a point that is too far from every surface.
@@ -318,8 +351,14 @@ Region find_region(const Map& map, const Contact& contact, const RegionSettings&
   rule.centre = contact.voxel;
   rule.radius_voxels = float(settings.radius_m / map.voxel_size_m);
   if (settings.rule == RegionRule::sphere) return surface_blocks(map, rule);
+  if (settings.rule == RegionRule::instance) {
+    rule.instance = contact_instance(map, contact.voxel, rule);
+    return surface_blocks(map, rule);
+  }
+  if (settings.rule == RegionRule::segment) return segment_around(map, contact, settings, surface_blocks(map, rule));
   if (settings.rule != RegionRule::connected)
-    throw TouchError(describe_mismatch("region", "rule", "connected or sphere", rule_name(settings.rule)));
+    throw TouchError(
+        describe_mismatch("region", "rule", "connected, sphere, instance or segment", rule_name(settings.rule)));
   rule.slot = contact.slot;
   rule.class_ratio = float(settings.class_ratio);
   rule.cos_normal_change = float(std::cos(settings.normal_change_deg * std::numbers::pi / 180));

@@ -42,6 +42,9 @@ Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const Regio
 ///   the band all have normals within `normal_change_deg` of theirs; their neighbours join and end it. So nothing on
 ///   the far side of a crease can join, whatever the order of growth.
 /// * `sphere`: the surface band within radius_m of the contact.
+/// * `instance`: the surface band of the thing that the contact belongs to, wherever it is in the map.
+/// * `segment`: the contact's segment among those that the whole map is cut into (mapping/map_segments.h), as far as it
+///   lies within radius_m. `color_change` is then between neighbours, CIE Lab units.
 /// Deterministic; blocks are examined in parallel.
 Region find_region(const Map& map, const Contact& contact, const RegionSettings& settings);
 

@@ -6,13 +6,26 @@
 namespace felt {
 
 const char* rule_name(RegionRule rule) {
-  return rule == RegionRule::connected ? "connected" : rule == RegionRule::mask ? "mask" : "sphere";
+  switch (rule) {
+    case RegionRule::connected:
+      return "connected";
+    case RegionRule::mask:
+      return "mask";
+    case RegionRule::sphere:
+      return "sphere";
+    case RegionRule::instance:
+      return "instance";
+    case RegionRule::segment:
+      return "segment";
+  }
+  return "";
 }
 
 RegionRule rule_of_name(const std::string& name) {
-  for (const RegionRule rule : {RegionRule::connected, RegionRule::mask, RegionRule::sphere})
+  for (const RegionRule rule : {RegionRule::connected, RegionRule::mask, RegionRule::sphere, RegionRule::instance,
+                                RegionRule::segment})
     if (name == rule_name(rule)) return rule;
-  throw TouchError(describe_mismatch("region", "rule", "connected, mask or sphere", "'" + name + "'"));
+  throw TouchError(describe_mismatch("region", "rule", "connected, mask, sphere, instance or segment", "'" + name + "'"));
 }
 
 void validate(const RegionSettings& s) {

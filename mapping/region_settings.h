@@ -13,7 +13,7 @@ public:
   using Error::Error;
 };
 
-enum class RegionRule { connected, mask, sphere };
+enum class RegionRule { connected, mask, sphere, instance, segment };
 const char* rule_name(RegionRule rule);
 /// Throws TouchError for an unknown name.
 RegionRule rule_of_name(const std::string& name);

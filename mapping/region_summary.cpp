@@ -106,6 +106,8 @@ Part examine(const Map& map, const Region& region, size_t b, const RegionSetting
       part.evidence[e.slot] += double(count);
       if (count > best) best = count, strongest = e.slot;
     }
+    if (block.even_evidence != nullptr)
+      for (double& e : part.evidence) e += double(block.even_evidence->value[i]) / double(k);
     ++(strongest < 0 ? part.unlabelled : part.class_voxels[size_t(strongest)]);
 
     bool open = false, other = false;
@@ -143,7 +145,7 @@ RegionSummary summarize(const Map& map, const Region& region, const RegionSettin
   out.voxels = region.voxels();
   out.blocks = region.blocks();
   out.class_voxels.assign(k, 0);
-  out.pooled_belief.assign(k, double(out.voxels));  // the prior concentration of each voxel
+  for (size_t c = 0; c < k; ++c) out.pooled_belief.push_back(double(out.voxels) * map.classes.prior(int(c)));
   Region boundary;
   size_t open = 0;
   Eigen::Array3d lo = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()), hi = -lo;

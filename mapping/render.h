@@ -11,7 +11,7 @@
 
 namespace felt {
 
-struct RenderOptions {
+struct ViewOptions {
   double min_depth_m = 0.05;  ///< along the optical axis
   double max_depth_m = 10;
   bool normals = true;
@@ -34,26 +34,24 @@ struct RenderedView {
 
 /// Ray casting through the blocks of a map, which must outlive the caster and not change meanwhile.
 ///
-/// A ray steps over absent blocks and over blocks far in front of the surface, marches through the others by the
-/// stored distance, and stops where the trilinear signed distance passes from positive to negative between points
-/// whose eight voxels were all observed: the surface that `extract_mesh` gives, seen from its front. The crossing is
-/// refined by regula falsi (Illinois) until the step is below 1/1000 voxel. As the stored distance is projective it
-/// can exceed the true one: a step is at most half of it.
+/// A ray walks from block to block and, in blocks that the surface crosses, from cell to cell (a cube between eight
+/// voxel centres; mapping/block_index.h knows which the surface can cross). It stops in the first cell where the
+/// trilinear signed distance, known at all eight corners, passes from positive to negative along the ray: the surface
+/// that `extract_mesh` gives, seen from its front. The crossing is refined by regula falsi (Illinois) until the step is
+/// below 1/1000 voxel.
 class RayCaster {
 public:
   explicit RayCaster(const Map& map, float min_weight = 1e-6f);
 
   /// Parallel over tiles; the same for any number of threads.
   RenderedView render(const PinholeCamera& camera, const Eigen::Isometry3d& T_world_camera,
-                      const RenderOptions& options = {}) const;
+                      const ViewOptions& options = {}) const;
 
   /// First front-facing surface point along origin + s * direction (world, metres), s in (s_min, s_max): s, or nothing.
   std::optional<double> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double s_min,
                              double s_max) const;
 
 private:
-  class Sampler;
-
   const Map& map_;
   float min_weight_;
   BlockIndex index_;

@@ -1,58 +1,66 @@
 #include "mapping/render_classes.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
 #include <cmath>
+
+#include "inference/decision.h"
 
 namespace felt {
 namespace {
 
-constexpr uint16_t kNoClass = 0xffff;
-constexpr double kPriorCount = 1;
-
-/// Calls `value(voxel)` for every pixel with a surface, in parallel over rows.
-template <typename T, typename Value>
-Image<T> per_pixel(const Image<VoxelRef>& voxels, T absent, Value value) {
-  Image<T> image(voxels.width(), voxels.height(), absent);
-  tbb::parallel_for(0, voxels.height(), [&](int v) {
-    for (int u = 0; u < voxels.width(); ++u)
-      if (voxels(u, v).block != BlockStore::kNone) image(u, v) = value(voxels(u, v));
+/// Calls `visit(u, v, voxel, p)` for every pixel with a surface, in parallel over rows; `p`: room for its class
+/// probabilities.
+template <typename Visit>
+void for_each_surface_pixel(const VoxelBeliefs& beliefs, const Image<VoxelRef>& voxels, Visit visit) {
+  tbb::parallel_for(tbb::blocked_range<int>(0, voxels.height(), 8), [&](const auto& rows) {
+    std::vector<double> p(size_t(beliefs.classes()));
+    for (int v = rows.begin(); v < rows.end(); ++v)
+      for (int u = 0; u < voxels.width(); ++u)
+        if (voxels(u, v).block != BlockStore::kNone) visit(u, v, voxels(u, v), p);
   });
-  return image;
 }
 
 }  // namespace
 
-std::vector<double> class_probability(const Map& map, const VoxelRef& voxel) {
-  std::vector<double> p(size_t(map.classes.size()), kPriorCount);
-  double sum = kPriorCount * double(p.size());
-  for (const EvidencePlane& plane : map.store[voxel.block].evidence) {
-    const double count = plane.counts->value[voxel.offset];
-    p[plane.slot] += count;
-    sum += count;
-  }
-  for (double& x : p) x /= sum;
-  return p;
+LabelImage class_image(const Map& map, const VoxelBeliefs& beliefs, const Image<VoxelRef>& voxels) {
+  LabelImage image(voxels.width(), voxels.height(), kNoLabel);
+  for_each_surface_pixel(beliefs, voxels, [&](int u, int v, const VoxelRef& voxel, auto&) {
+    if (const int slot = beliefs.strongest_class(voxel); slot >= 0) image(u, v) = map.classes.at_slot(slot).id;
+  });
+  return image;
 }
 
-LabelImage class_image(const Map& map, const Image<VoxelRef>& voxels) {
-  return per_pixel<uint16_t>(voxels, kNoClass, [&](const VoxelRef& voxel) {
-    const EvidencePlane* best = nullptr;
-    for (const EvidencePlane& plane : map.store[voxel.block].evidence) {
-      const float count = plane.counts->value[voxel.offset];
-      if (count > (best == nullptr ? 0 : best->counts->value[voxel.offset])) best = &plane;
-    }
-    return best == nullptr ? kNoClass : map.classes.at_slot(best->slot).id;
+Image<float> entropy_image(const VoxelBeliefs& beliefs, const Image<VoxelRef>& voxels) {
+  Image<float> image(voxels.width(), voxels.height(), 0);
+  for_each_surface_pixel(beliefs, voxels, [&](int u, int v, const VoxelRef& voxel, auto& p) {
+    beliefs.class_probability(voxel, p);
+    image(u, v) = float(class_entropy(p));
   });
+  return image;
 }
 
-Image<float> entropy_image(const Map& map, const Image<VoxelRef>& voxels) {
-  return per_pixel<float>(voxels, 0, [&](const VoxelRef& voxel) {
-    double entropy = 0;
-    for (const double p : class_probability(map, voxel)) entropy -= p > 0 ? p * std::log(p) : 0;
-    return float(entropy);
+Image<float> probability_image(const VoxelBeliefs& beliefs, const Image<VoxelRef>& voxels, int slot) {
+  Image<float> image(voxels.width(), voxels.height(), 0);
+  for_each_surface_pixel(beliefs, voxels, [&](int u, int v, const VoxelRef& voxel, auto& p) {
+    beliefs.class_probability(voxel, p);
+    image(u, v) = float(p[size_t(slot)]);
   });
+  return image;
+}
+
+PropertyImages property_images(const VoxelBeliefs& beliefs, const Image<VoxelRef>& voxels, int property) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  PropertyImages images{Image<float>(voxels.width(), voxels.height(), float(kNone)),
+                        Image<float>(voxels.width(), voxels.height(), float(kNone))};
+  for_each_surface_pixel(beliefs, voxels, [&](int u, int v, const VoxelRef& voxel, auto&) {
+    const StudentTMixture next = beliefs.next_reading(voxel, property);
+    if (next.weight.empty()) return;
+    images.mean(u, v) = float(mean(next).value_or(kNone));
+    images.sd(u, v) = float(std::sqrt(variance(next).value_or(kNone)));
+  });
+  return images;
 }
 
 }  // namespace felt

@@ -1,22 +1,28 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
 
 #include "core/image.h"
-#include "mapping/map.h"
 #include "mapping/render.h"
+#include "mapping/voxel_beliefs.h"
 
 namespace felt {
 
-/// Expected class probabilities of a voxel by slot: Dirichlet with one count a class as the prior, plus what was seen.
-std::vector<double> class_probability(const Map& map, const VoxelRef& voxel);
-
-/// Class id of the strongest class of each pixel's voxel (the lower slot where two are equal); the id 0xffff where
-/// there is no surface or no evidence.
-LabelImage class_image(const Map& map, const Image<VoxelRef>& voxels);
+/// Class id of the strongest class of each pixel's voxel; the id kNoLabel where there is no surface, or neither
+/// evidence nor a touch. Images of this header are computed in parallel.
+LabelImage class_image(const Map& map, const VoxelBeliefs& beliefs, const Image<VoxelRef>& voxels);
 
 /// Entropy of the class probabilities, nats; 0 where there is no surface.
-Image<float> entropy_image(const Map& map, const Image<VoxelRef>& voxels);
+Image<float> entropy_image(const VoxelBeliefs& beliefs, const Image<VoxelRef>& voxels);
+
+/// Probability of one class; 0 where there is no surface.
+Image<float> probability_image(const VoxelBeliefs& beliefs, const Image<VoxelRef>& voxels, int slot);
+
+/// Mean and standard deviation of the next reading of a property, in its unit; NaN where there is no surface, no class
+/// with a prior, or no such moment.
+struct PropertyImages {
+  Image<float> mean, sd;
+};
+PropertyImages property_images(const VoxelBeliefs& beliefs, const Image<VoxelRef>& voxels, int property);
 
 }  // namespace felt

@@ -11,11 +11,12 @@ namespace {
 
 bool is_mixture(const Touch& touch) { return !touch.undone && touch.request.model == TouchModel::mixture; }
 
-/// Properties with an active `mixture` touch, ascending.
-std::vector<int> mixed_properties(const Map& map) {
+/// Touched properties, ascending: a voxel that `material` touches of one and `mixture` touches of another cover has a
+/// state in both.
+std::vector<int> touched_properties(const Map& map) {
   std::vector<int> properties;
   for (const Touch& touch : map.touches.touches)
-    if (is_mixture(touch)) properties.push_back(*map.properties.index_of(touch.request.property));
+    if (!touch.undone) properties.push_back(*map.properties.index_of(touch.request.property));
   std::sort(properties.begin(), properties.end());
   properties.erase(std::unique(properties.begin(), properties.end()), properties.end());
   return properties;
@@ -25,12 +26,19 @@ std::vector<int> mixed_properties(const Map& map) {
 void start(const Map& map, MixtureBlock& block, const std::vector<int>& properties,
            const std::vector<std::vector<Nig>>& priors) {
   const size_t k = size_t(map.classes.size()), m = block.voxels;
-  block.a.assign(k * m, 1.0f);
-  if (const Block* counted = map.store.get(block.coord))
+  block.a.resize(k * m);
+  for (size_t c = 0; c < k; ++c) std::fill_n(&block.a[c * m], m, float(map.classes.prior(int(c))));
+  if (const Block* counted = map.store.get(block.coord)) {
+    if (const Plane* even = counted->even_evidence)
+      for (size_t c = 0; c < k; ++c) {
+        float* a = &block.a[c * m];
+        for_each_bit(block.mask, [&](int offset) { *a++ += even->value[offset] / float(k); });
+      }
     for (const EvidencePlane& e : counted->evidence) {
       float* a = &block.a[e.slot * m];
       for_each_bit(block.mask, [&](int offset) { *a++ += e.counts->value[offset]; });
     }
+  }
   for (const int p : properties) {
     MixtureBlock::Blocks& state = block.properties.emplace_back();
     state.property = p;
@@ -122,7 +130,7 @@ MixtureState mixture_state(const Map& map, const Region& region) {
     of_model = united(of_model, touch.region);
   }
   mixed = intersected(mixed, region);
-  const std::vector<int> properties = mixed_properties(map);
+  const std::vector<int> properties = touched_properties(map);
   out.blocks.resize(mixed.blocks());
   tbb::parallel_for(size_t(0), mixed.blocks(), [&](size_t b) {
     MixtureBlock& block = out.blocks[b];

@@ -11,15 +11,15 @@
 #include "inference/decision.h"
 #include "inference/mixture.h"
 #include "inference/priors.h"
+#include "mapping/class_belief.h"
 
 namespace felt {
 namespace {
 
-/// Vision concentrations of one voxel: one a class plus its counts.
+/// Vision concentrations of one voxel.
 std::vector<double> vision_concentration(const Map& map, const Index3& voxel) {
-  std::vector<double> alpha(size_t(map.classes.size()), 1.0);
-  if (const Block* block = map.store.get(block_of_voxel(voxel)))
-    for (const EvidencePlane& e : block->evidence) alpha[e.slot] += double(e.counts->value[offset_in_block(voxel)]);
+  std::vector<double> alpha(size_t(map.classes.size()));
+  class_concentration(map.store.get(block_of_voxel(voxel)), offset_in_block(voxel), map.classes, alpha);
   return alpha;
 }
 
@@ -33,8 +33,13 @@ std::vector<double> summed_concentration(const Map& map, const Region& region) {
     if (block == nullptr) return;
     for (const EvidencePlane& e : block->evidence)
       for_each_bit(region.mask[b], [&](int i) { sum[e.slot] += double(e.counts->value[i]); });
+    if (block->even_evidence == nullptr) return;
+    double even = 0;
+    for_each_bit(region.mask[b], [&](int i) { even += double(block->even_evidence->value[i]); });
+    for (size_t c = 0; c < k; ++c) sum[c] += even / double(k);
   });
-  std::vector<double> total(k, double(region.voxels()));
+  std::vector<double> total(k);
+  for (size_t c = 0; c < k; ++c) total[c] = double(region.voxels()) * map.classes.prior(int(c));
   for (size_t i = 0; i < of_block.size(); ++i) total[i % k] += of_block[i];
   return total;
 }

@@ -9,6 +9,7 @@
 
 #include "inference/class_posterior.h"
 #include "inference/information_gain.h"
+#include "mapping/map_segments.h"
 #include "mapping/region_surface.h"
 
 namespace felt {
@@ -74,6 +75,11 @@ std::vector<Outcome> outcomes_of(const Belief& belief, const StudentTMixture& ne
 }  // namespace
 
 std::vector<Region> segments(const Map& map, const RegionSettings& settings, size_t min_voxels) {
+  if (settings.rule == RegionRule::segment) {
+    std::vector<Region> all = map_segments(map, map_segment_settings(settings));
+    std::erase_if(all, [&](const Region& region) { return region.voxels() < min_voxels; });
+    return all;
+  }
   std::unordered_map<BlockCoord, BlockMask> done;
   std::vector<Region> found;
   const float band_m = float(settings.band_voxels * map.voxel_size_m);
@@ -82,7 +88,8 @@ std::vector<Region> segments(const Map& map, const RegionSettings& settings, siz
     if (block.evidence.empty()) continue;
     const BlockMask band = surface_band(block, band_m, float(settings.min_weight));
     for (int tries = 0; tries < kSeedsPerBlock; ++tries) {
-      const BlockMask left = band - done[block.coord];
+      // Beside a known segment lies its border: from there the same surface would be flooded again.
+      const BlockMask left = band - dilated_inside(done[block.coord]);
       if (!left.any()) break;
       int seed = -1;
       for_each_bit(left, [&](int i) {

@@ -11,7 +11,7 @@ namespace felt {
 struct SuggestionSettings {
   int most = 10;            ///< suggestions returned
   size_t min_voxels = 200;  ///< smaller segments are not worth a touch
-  RegionSettings region;    ///< rule `connected`
+  RegionSettings region;    ///< rule `connected`, or `segment` for those of mapping/map_segments.h
 };
 
 /// What a touch may find: the segment is class `slot` and reads as that class does on average.
@@ -33,7 +33,8 @@ struct Suggestion {
 };
 
 /// Cuts the map's labelled surface into the regions that touches would update, in canonical order of their first voxel;
-/// each voxel belongs to the first region that reaches it. Regions below `min_voxels` are left out.
+/// each voxel belongs to the first region that reaches it. With the rule `segment` they are the map's segments, labelled
+/// or not. Regions below `min_voxels` are left out.
 std::vector<Region> segments(const Map& map, const RegionSettings& settings, size_t min_voxels);
 
 /// Segments ranked by expected information gain of a reading of `property` times area. Throws TouchError for an unknown

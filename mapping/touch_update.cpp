@@ -21,19 +21,29 @@ std::string number(double x) {
   return text;
 }
 
-/// Statistics of one property over the touches of one block, voxel by voxel in canonical order (Welford).
+/// Statistics of one property over the touches of one block, voxel by voxel in canonical order (Welford). `planes` hold
+/// zeros.
 void accumulate(const Map& map, uint16_t property, const BlockCoord& coord, const TouchPlanes& planes) {
-  for (Plane* plane : {planes.n, planes.mean, planes.m2}) std::memset(plane, 0, sizeof(Plane));
+  bool first = true;
   for (const Touch& touch : map.touches.touches) {
     if (touch.undone || touch.request.property != map.properties[property].name) continue;
     const BlockMask* mask = touch.region.find(coord);
     if (mask == nullptr) continue;
+    const double psi = touch.request.value;
+    if (first) {
+      for_each_bit(*mask, [&](int i) {
+        planes.n->value[i] = 1;
+        planes.mean->value[i] = float(psi);
+      });
+      first = false;
+      continue;
+    }
     for_each_bit(*mask, [&](int i) {
       float &n = planes.n->value[i], &mean = planes.mean->value[i], &m2 = planes.m2->value[i];
-      const double step = touch.request.value - double(mean);
+      const double step = n > 0 ? psi - double(mean) : psi;
       n += 1;
-      mean = float(double(mean) + step / double(n));
-      m2 = float(double(m2) + step * (touch.request.value - double(mean)));
+      mean = float(n > 1 ? double(mean) + step / double(n) : psi);
+      if (n > 1) m2 = float(double(m2) + step * (psi - double(mean)));
     });
   }
 }
@@ -50,6 +60,8 @@ void update_block(Map& map, Block& block) {
                                [](const TouchPlanes& planes, size_t property) { return planes.property < property; });
     if (at == block.touch.end() || at->property != p)
       at = block.touch.insert(at, {uint16_t(p), map.store.new_plane(), map.store.new_plane(), map.store.new_plane()});
+    else
+      for (Plane* plane : {at->n, at->mean, at->m2}) std::memset(plane, 0, sizeof(Plane));
     accumulate(map, uint16_t(p), block.coord, *at);
   }
 }
@@ -91,16 +103,16 @@ BeliefSummary summary_of(const Belief& belief, size_t property) {
 
 }  // namespace
 
-Touch resolve_touch(const Map& map, const TouchRequest& request, const ViewMask* view) {
+void check_reading(const PropertyTable& properties, const ClassTable& classes, const TouchRequest& request) {
   const std::string where = "touch of '" + request.property + "'";
-  const auto property = map.properties.index_of(request.property);
+  const auto property = properties.index_of(request.property);
   if (!property) {
     std::string known;
-    for (const Property& p : map.properties.properties()) known.append(known.empty() ? "" : ", ").append(p.name);
+    for (const Property& p : properties.properties()) known.append(known.empty() ? "" : ", ").append(p.name);
     throw TouchError(describe_mismatch("touch", "property", known.empty() ? "a map with properties" : known,
                                        "'" + request.property + "'"));
   }
-  const Property& p = map.properties[*property];
+  const Property& p = properties[*property];
   if (!std::isfinite(request.value) || request.value < p.support_lo || request.value > p.support_hi)
     throw TouchError(describe_mismatch(where, "value",
                                        "a number in [" + number(p.support_lo) + ", " + number(p.support_hi) + "]",
@@ -111,9 +123,14 @@ Touch resolve_touch(const Map& map, const TouchRequest& request, const ViewMask*
     throw TouchError(describe_mismatch(where, "stamp", "a finite time", number(request.stamp_s)));
   if (!std::isnan(request.rho) && !(request.rho >= 0 && request.rho < 1))
     throw TouchError(describe_mismatch(where, "rho", "0 <= rho < 1", number(request.rho)));
-  if (!class_priors(p, map.classes).any())
+  if (!class_priors(p, classes).any())
     throw TouchError(describe_mismatch(where, "priors", "one of the map's classes with a prior", "none"));
   validate(request.region);
+}
+
+Touch resolve_touch(const Map& map, const TouchRequest& request, const ViewMask* view) {
+  const std::string where = "touch of '" + request.property + "'";
+  check_reading(map.properties, map.classes, request);
   if (request.region.rule == RegionRule::mask && view == nullptr)
     throw TouchError(describe_mismatch(where, "region", "a mask image with its camera", "none"));
   const Contact contact = find_contact(map, request.point_m, request.region);
@@ -174,6 +191,18 @@ void redo_touch(Map& map, uint64_t id) { set_undone(map, id, false); }
 
 void rebuild_touch_planes(Map& map) {
   tbb::parallel_for(size_t(0), map.store.size(), [&](size_t n) { update_block(map, map.store[uint32_t(n)]); });
+}
+
+size_t touch_plane_bytes(const Map& map) {
+  size_t planes = 0;
+  for (const Block& block : map.store.blocks()) planes += 3 * block.touch.size();
+  return planes * sizeof(Plane);
+}
+
+size_t journal_bytes(const TouchJournal& journal) {
+  size_t bytes = journal.touches.size() * sizeof(Touch);
+  for (const Touch& touch : journal.touches) bytes += touch.region.blocks() * (sizeof(BlockCoord) + sizeof(BlockMask));
+  return bytes;
 }
 
 void refresh_touch_regions(Map& map) {

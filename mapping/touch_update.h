@@ -8,9 +8,13 @@
 
 namespace felt {
 
-/// Checks a request against the map and finds its region. `view`: for the rule `mask`. Throws TouchError naming what is
-/// wrong: an unknown property, a value that is not finite or outside the support, no class with a prior, settings, and
-/// all of find_contact and find_region. The map is not touched.
+/// Checks what a reading says against what a map can hold, without looking for its place. Throws TouchError naming what
+/// is wrong: an unknown property, a value that is not finite or outside the support, a wrong sigma, stamp or rho, no
+/// class with a prior, settings.
+void check_reading(const PropertyTable& properties, const ClassTable& classes, const TouchRequest& request);
+
+/// Checks a request against the map and finds its region. `view`: for the rule `mask`. Throws TouchError as
+/// check_reading, find_contact and find_region do. The map is not touched.
 Touch resolve_touch(const Map& map, const TouchRequest& request, const ViewMask* view = nullptr);
 
 /// Records a touch and brings the statistics planes of its blocks up to date. Returns its id.
@@ -38,6 +42,10 @@ void redo_touch(Map& map, uint64_t id);
 
 /// Writes the statistics planes of every block anew from the journal, as after loading or merging.
 void rebuild_touch_planes(Map& map);
+
+/// Heap bytes of the statistics planes (only touched blocks have any), and of the journal with its region masks.
+size_t touch_plane_bytes(const Map& map);
+size_t journal_bytes(const TouchJournal& journal);
 
 /// Finds the regions of all active `connected` and `sphere` touches anew, as the map is now: after frames, so that
 /// touches recorded before, between and after frames give the same map. A touch whose contact is gone keeps its region.

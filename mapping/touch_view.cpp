@@ -8,7 +8,6 @@
 
 #include "inference/decision.h"
 #include "inference/priors.h"
-#include "mapping/touch_mixture.h"
 
 namespace felt {
 namespace {
@@ -67,6 +66,19 @@ bool any_mixture(const Map& map, const TouchGroup& group) {
                      [&](uint32_t t) { return map.touches.touches[t].request.model == TouchModel::mixture; });
 }
 
+/// Whether a property of the group has `material` readings and no `mixture` ones.
+bool any_material_only(const Map& map, const TouchGroup& group) {
+  const auto has = [&](const std::string& property, TouchModel model) {
+    return std::any_of(group.touches.begin(), group.touches.end(), [&](uint32_t t) {
+      const TouchRequest& r = map.touches.touches[t].request;
+      return r.property == property && r.model == model;
+    });
+  };
+  return std::any_of(map.properties.properties().begin(), map.properties.properties().end(), [&](const Property& p) {
+    return has(p.name, TouchModel::material) && !has(p.name, TouchModel::mixture);
+  });
+}
+
 }  // namespace
 
 TouchedLabels touched_labels(const Map& map, const Region& region) {
@@ -111,6 +123,50 @@ TouchedLabels touched_labels(const Map& map, const Region& region) {
   return out;
 }
 
+const TouchView* view_of(const std::vector<TouchView>& views, const BlockCoord& block) {
+  const auto at = std::lower_bound(views.begin(), views.end(), block,
+                                   [](const TouchView& view, const BlockCoord& c) { return view.coord < c; });
+  return at != views.end() && at->coord == block ? &*at : nullptr;
+}
+
+ClassBelief class_belief_at(const Map& map, const std::vector<TouchView>& touched, const Index3& voxel) {
+  const BlockCoord coord = block_of_voxel(voxel);
+  const int i = offset_in_block(voxel);
+  if (const TouchView* view = view_of(touched, coord); view != nullptr && view->mask.test(i))
+    return {uint16_t(view->label[size_t(i)]), view->label_probability[size_t(i)], view->entropy[size_t(i)]};
+  const Block* block = map.store.get(coord);
+  return block == nullptr ? ClassBelief{} : class_belief(*block, i, map.classes);
+}
+
+TouchBlocks::TouchBlocks(const Map& map) {
+  Beliefs beliefs(map);
+  Region touched;
+  for (TouchGroup& group : touch_groups(map)) {
+    touched = united(touched, group.region);
+    if (any_mixture(map, group)) continue;
+    const MaterialState& state = beliefs.material(group.touches);
+    groups_.push_back({std::move(group.region), beliefs.assemble(state.classes.p, &state, group.touches).nig});
+  }
+  mixed_ = mixture_state(map, touched);
+}
+
+void TouchBlocks::copy(const BlockCoord& coord, int property, int slot, double Nig::*number, float* out) const {
+  for (const Group& group : groups_)
+    if (const BlockMask* bits = group.region.find(coord)) {
+      const auto value = float(group.nig[size_t(property)][size_t(slot)].*number);
+      for_each_bit(*bits, [&](int i) { out[i] = value; });
+    }
+  const auto block = std::lower_bound(mixed_.blocks.begin(), mixed_.blocks.end(), coord,
+                                      [](const MixtureBlock& b, const BlockCoord& c) { return b.coord < c; });
+  if (block == mixed_.blocks.end() || !(block->coord == coord)) return;
+  for (const MixtureBlock::Blocks& state : block->properties) {
+    if (state.property != property) continue;
+    size_t i = 0;
+    for_each_bit(block->mask,
+                 [&](int offset) { out[offset] = float(mixed_.nig(*block, state, size_t(slot), i++).*number); });
+  }
+}
+
 std::vector<TouchView> touch_views(const Map& map) {
   Region touched;
   const std::vector<TouchGroup> groups = touch_groups(map);
@@ -123,8 +179,10 @@ std::vector<TouchView> touch_views(const Map& map) {
     views[b].mean.resize(properties);
     views[b].sd.resize(properties);
   }
-  const auto put = [&](const BlockCoord& coord, int i, const Cell& cell) {
-    TouchView& view = views[size_t(touched.find(coord) - touched.mask.data())];
+  const auto view_of = [&](const BlockCoord& coord) -> TouchView& {
+    return views[size_t(touched.find(coord) - touched.mask.data())];
+  };
+  const auto put = [&](TouchView& view, int i, const Cell& cell) {
     view.label[size_t(i)] = cell.label;
     view.label_probability[size_t(i)] = cell.label_probability;
     view.entropy[size_t(i)] = cell.entropy;
@@ -139,16 +197,32 @@ std::vector<TouchView> touch_views(const Map& map) {
     const MaterialState& state = beliefs.material(group.touches);
     const Belief belief = beliefs.assemble(state.classes.p, &state, group.touches);
     const Cell cell = cell_of(state.classes.p, belief.next_reading);
-    for (size_t b = 0; b < group.region.blocks(); ++b)
-      for_each_bit(group.region.mask[b], [&](int i) { put(group.region.coord[b], i, cell); });
+    for (size_t b = 0; b < group.region.blocks(); ++b) {
+      TouchView& view = view_of(group.region.coord[b]);
+      for_each_bit(group.region.mask[b], [&](int i) { put(view, i, cell); });
+    }
   }
-  const MixtureState mixed = mixture_state(map, touched);
+  // A property with `material` readings only keeps its predictive of this very region, which no moments hold: the
+  // voxels that another property's `mixture` touches cover as well are answered one by one.
+  Region apart;
+  for (const TouchGroup& group : groups)
+    if (any_mixture(map, group) && any_material_only(map, group)) apart = united(apart, group.region);
+  for (size_t b = 0; b < apart.blocks(); ++b) {
+    TouchView& view = view_of(apart.coord[b]);
+    for_each_bit(apart.mask[b], [&](int i) {
+      const Index3 f = first_voxel(apart.coord[b]), v = voxel_of_offset(i);
+      const Belief belief = beliefs.at({f.x + v.x, f.y + v.y, f.z + v.z});
+      put(view, i, cell_of(belief.class_probability, belief.next_reading));
+    });
+  }
+  const MixtureState mixed = mixture_state(map, subtracted(touched, apart));
   tbb::parallel_for(size_t(0), mixed.blocks.size(), [&](size_t b) {
     const MixtureBlock& block = mixed.blocks[b];
+    TouchView& view = view_of(block.coord);
     size_t i = 0;
     for_each_bit(block.mask, [&](int offset) {
       const Belief belief = belief_of(mixed, block, i++);
-      put(block.coord, offset, cell_of(belief.class_probability, belief.next_reading));
+      put(view, offset, cell_of(belief.class_probability, belief.next_reading));
     });
   });
   return views;

@@ -3,6 +3,8 @@
 #include <array>
 #include <vector>
 
+#include "mapping/class_belief.h"
+#include "mapping/touch_mixture.h"
 #include "mapping/touch_state.h"
 
 namespace felt {
@@ -19,6 +21,28 @@ struct TouchView {
 
 /// Views of every touched block in canonical order.
 std::vector<TouchView> touch_views(const Map& map);
+
+/// The view of a block, or null where no touch reached it.
+const TouchView* view_of(const std::vector<TouchView>& views, const BlockCoord& block);
+
+/// What is believed of the class of a voxel, touches included; `touched`: the map's views.
+ClassBelief class_belief_at(const Map& map, const std::vector<TouchView>& touched, const Index3& voxel);
+
+/// The moment-matched Normal-Inverse-Gamma blocks of every touched voxel, computed once and read plane by plane.
+class TouchBlocks {
+public:
+  explicit TouchBlocks(const Map& map);
+  /// One number of a class's block for the touched voxels of a map block, into 512 floats; others are left alone.
+  void copy(const BlockCoord& coord, int property, int slot, double Nig::*number, float* out) const;
+
+private:
+  struct Group {
+    Region region;
+    std::vector<std::vector<Nig>> nig;  ///< by property, slot
+  };
+  std::vector<Group> groups_;  ///< touched by `material` only
+  MixtureState mixed_;
+};
 
 /// Strongest class of every voxel of a region in canonical order, touched or not: -1 without evidence and touches.
 struct TouchedLabels {

@@ -138,14 +138,14 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
   const DepthView view = depth_view(frame, config, map, depth_scale(frame, config, scratch),
                                     bounded ? &scratch.allocation.tiles : nullptr);
   const auto* rgba = reinterpret_cast<const uint32_t*>(frame.color.data());
-  const bool labelled = map.classes.size() > 0 && (!frame.labels.empty() || !frame.probabilities.empty());
-  const LabelView labels{.classes = &map.classes,
-                         .labels = &frame.labels,
-                         .probabilities = &frame.probabilities,
-                         .config = config.labels,
-                         .band_m = float(config.labels.band_vox * map.voxel_size_m)};
+  const bool says_classes = !frame.labels.empty() || !frame.probabilities.empty();
+  const double novelty =
+      says_classes ? scratch.viewpoints.add(frame.T_world_camera, config.labels.novelty_m, config.labels.novelty_deg)
+                   : 1;
+  const LabelView labels = label_view(frame, map.classes, config.labels, map.voxel_size_m, novelty);
+  const bool labelled = labels.says_classes() || labels.says_instances();
   std::atomic<size_t> updated{0};
-  std::atomic<uint64_t> label_voxels{0}, label_unknown{0};
+  std::atomic<uint64_t> label_voxels{0}, label_unknown{0}, label_invalid{0};
   tbb::parallel_for(tbb::blocked_range<size_t>(0, coords.size(), 16), [&](const tbb::blocked_range<size_t>& range) {
     BlockObservation observation;
     size_t observed = 0;
@@ -167,9 +167,10 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
     updated.fetch_add(observed, std::memory_order_relaxed);
     label_voxels.fetch_add(label_stats.voxels, std::memory_order_relaxed);
     label_unknown.fetch_add(label_stats.unknown, std::memory_order_relaxed);
+    label_invalid.fetch_add(label_stats.invalid, std::memory_order_relaxed);
   });
   stats.blocks_updated = updated;
-  stats.labels = {label_voxels, label_unknown};
+  stats.labels = {label_voxels, label_unknown, label_invalid};
   stats.fuse_s = seconds_since(fusing);
   return stats;
 }

@@ -8,6 +8,7 @@
 #include "mapping/label_fusion.h"
 #include "mapping/map.h"
 #include "mapping/tsdf_kernels.h"
+#include "mapping/view_novelty.h"
 
 namespace felt {
 
@@ -27,6 +28,7 @@ struct IntegrationScratch {
   std::vector<uint32_t> blocks;
   std::vector<float> depth_scale;    ///< per pixel factor of the distance model
   PinholeCamera depth_scale_camera;  ///< of the cached ray lengths
+  ViewNovelty viewpoints;            ///< of the frames fused so far
 };
 
 /// Fuses one frame: the frame loop of the engine. Bit-identical for any number of threads (each block is written by one

@@ -2,17 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
 
+#include "mapping/leaf_mask.h"
 #include "mapping/touch_view.h"
 
 namespace felt {
 namespace {
-
-openvdb::Coord coord_of(const BlockCoord& block, int offset) {
-  const Index3 f = first_voxel(block), v = voxel_of_offset(offset);
-  return {f.x + v.x, f.y + v.y, f.z + v.z};
-}
 
 template <typename Grid>
 typename Grid::Ptr new_grid(const Map& map, const std::string& name) {
@@ -22,7 +19,61 @@ typename Grid::Ptr new_grid(const Map& map, const std::string& name) {
   return grid;
 }
 
+openvdb::Coord first_coord(const BlockCoord& c) { return {c.x * 8, c.y * 8, c.z * 8}; }
+
+/// A leaf for each block of the region, active where the region and a finite value are; `fill(b, out)` writes the
+/// values of its b-th block.
+template <typename Fill>
+openvdb::FloatGrid::Ptr float_grid(const Map& map, const Region& region, const std::string& name, const Fill& fill) {
+  auto grid = new_grid<openvdb::FloatGrid>(map, name);
+  for (size_t b = 0; b < region.blocks(); ++b) {
+    auto leaf = std::make_unique<openvdb::FloatTree::LeafNodeType>(first_coord(region.coord[b]), 0.0f);
+    float* values = leaf->buffer().data();
+    fill(b, values);
+    set_active(*leaf, [&](int i) { return region.mask[b].test(i) && std::isfinite(values[i]); });
+    for (int i = 0; i < kBlockVoxels; ++i)
+      if (!leaf->isValueOn(openvdb::Index(i))) values[i] = 0;
+    if (!leaf->isEmpty()) grid->tree().addLeaf(leaf.release());
+  }
+  return grid;
+}
+
+BlockMask all_voxels() {
+  BlockMask mask;
+  mask.word.fill(~uint64_t(0));
+  return mask;
+}
+
+/// Voxels that readings of a property cover.
+Region touched_region(const Map& map, int property) {
+  Region region;
+  for (const uint32_t number : map.store.sorted())
+    for (const TouchPlanes& planes : map.store[number].touch) {
+      if (planes.property != property) continue;
+      BlockMask bits;
+      for (int i = 0; i < kBlockVoxels; ++i)
+        if (planes.n->value[i] > 0) bits.set(i);
+      if (bits.any()) region.append(map.store[number].coord, bits);
+    }
+  return region;
+}
+
+/// `<property>_mean` or `<property>_sd`, active where it exists.
+openvdb::FloatGrid::Ptr property_grid(const Map& map, const PropertyView& view, const std::string& name, bool sd) {
+  Region known;
+  for (const uint32_t number : map.store.sorted())
+    if (const Block& block = map.store[number]; block.has_evidence() || !block.touch.empty())
+      known.append(block.coord, all_voxels());
+  return float_grid(map, known, name, [&](size_t b, float* out) {
+    float other[kBlockVoxels];
+    const Block& block = *map.store.get(known.coord[b]);
+    sd ? view.copy(block, other, out) : view.copy(block, out, other);
+  });
+}
+
 }  // namespace
+
+std::string touch_region_name(const Touch& touch) { return "touch_region/" + id_text(touch.id); }
 
 openvdb::MaskGrid::Ptr region_grid(const Map& map, const Region& region, const std::string& name) {
   auto grid = new_grid<openvdb::MaskGrid>(map, name);
@@ -51,42 +102,49 @@ Region region_of(const openvdb::MaskGrid& grid) {
   return region;
 }
 
-std::vector<openvdb::GridBase::Ptr> touch_grids(const Map& map) {
-  std::vector<openvdb::GridBase::Ptr> grids;
-  if (!map.touches.any_active()) return grids;
-  for (int p = 0; p < map.properties.size(); ++p) {
-    const std::string prefix = "touch/" + map.properties[p].name + "/";
-    auto n = new_grid<openvdb::FloatGrid>(map, prefix + "n"), mean = new_grid<openvdb::FloatGrid>(map, prefix + "mean"),
-         m2 = new_grid<openvdb::FloatGrid>(map, prefix + "m2");
-    for (const uint32_t number : map.store.sorted()) {
-      const Block& block = map.store[number];
-      for (const TouchPlanes& planes : block.touch) {
-        if (planes.property != p) continue;
-        for (int i = 0; i < kBlockVoxels; ++i) {
-          if (!(planes.n->value[i] > 0)) continue;
-          const openvdb::Coord at = coord_of(block.coord, i);
-          n->tree().setValueOn(at, planes.n->value[i]);
-          mean->tree().setValueOn(at, planes.mean->value[i]);
-          m2->tree().setValueOn(at, planes.m2->value[i]);
-        }
-      }
-    }
-    if (n->activeVoxelCount() > 0) grids.insert(grids.end(), {n, mean, m2});
-  }
-  const std::vector<TouchView> views = touch_views(map);
-  Region touched;
-  for (const TouchView& view : views) touched.append(view.coord, view.mask);
-  grids.push_back(region_grid(map, touched, "touched"));
-  for (size_t p = 0; p < size_t(map.properties.size()); ++p) {
-    auto mean = new_grid<openvdb::FloatGrid>(map, map.properties[int(p)].name + "_mean"),
-         sd = new_grid<openvdb::FloatGrid>(map, map.properties[int(p)].name + "_sd");
-    for (const TouchView& view : views)
-      for_each_bit(view.mask, [&](int i) {
-        const openvdb::Coord at = coord_of(view.coord, i);
-        if (std::isfinite(view.mean[p][size_t(i)])) mean->tree().setValueOn(at, view.mean[p][size_t(i)]);
-        if (std::isfinite(view.sd[p][size_t(i)])) sd->tree().setValueOn(at, view.sd[p][size_t(i)]);
+std::vector<NamedGrid> touch_grids(const Map& map, TouchViews touched) {
+  std::vector<NamedGrid> grids;
+  const bool labelled = std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
+                                    [](const Block& block) { return block.has_evidence(); });
+  if (map.properties.empty() || !labelled) return grids;
+  const auto add = [&](const std::string& name, auto make) {
+    grids.push_back({name, [name, make] { return make(name); }});
+  };
+  add("touched", [&map, touched](const std::string& name) {
+    Region region;
+    for (const TouchView& view : *touched) region.append(view.coord, view.mask);
+    return region_grid(map, region, name);
+  });
+  for (int p = 0; p < map.properties.size(); ++p)
+    for (const bool sd : {false, true})
+      add(map.properties[p].name + (sd ? "_sd" : "_mean"), [&map, touched, p, sd](const std::string& name) {
+        return property_grid(map, PropertyView(map, p, touched), name, sd);
       });
-    grids.insert(grids.end(), {mean, sd});
+  if (touched->empty()) return grids;
+  const auto blocks = std::make_shared<const TouchBlocks>(map);
+  for (int p = 0; p < map.properties.size(); ++p) {
+    const auto readings = std::make_shared<const Region>(touched_region(map, p));
+    if (readings->empty()) continue;
+    const std::string property = map.properties[p].name;
+    for (const auto& [part, plane] :
+         {std::pair("n", &TouchPlanes::n), {"mean", &TouchPlanes::mean}, {"m2", &TouchPlanes::m2}})
+      add("touch/" + property + "/" + part, [&map, readings, p, plane = plane](const std::string& name) {
+        return float_grid(map, *readings, name, [&](size_t b, float* out) {
+          for (const TouchPlanes& planes : map.store.get(readings->coord[b])->touch)
+            if (planes.property == p) std::copy_n((planes.*plane)->value, kBlockVoxels, out);
+        });
+      });
+    const std::vector<Nig> priors = nig_priors(map.properties[p], map.classes);
+    for (int slot = 0; slot < map.classes.size(); ++slot) {
+      if (!has_prior(priors[size_t(slot)])) continue;
+      for (const auto& [part, number] :
+           {std::pair("tau", &Nig::tau), {"kappa", &Nig::kappa}, {"beta", &Nig::beta}, {"gamma", &Nig::gamma}})
+        add("property/" + property + "/" + map.classes.at_slot(slot).name + "/" + part,
+            [&map, readings, blocks, p, slot, number = number](const std::string& name) {
+              return float_grid(map, *readings, name,
+                                [&](size_t b, float* out) { blocks->copy(readings->coord[b], p, slot, number, out); });
+            });
+    }
   }
   return grids;
 }

@@ -69,6 +69,35 @@ def stirling_tail(s):
     return (t / 12 - (loggamma(x) - (x - mpf(1) / 2) * log(x) + x - log(2 * pi) / 2)) / t**3
 
 
+def shape_of(t):
+    """b with t = 1/(b + 1/2)."""
+    return 1 / max(t, SMALL) - mpf(1) / 2
+
+
+def d(x):
+    return log(x) - digamma(x)
+
+
+def shape_d(t):
+    """b D(b)."""
+    return shape_of(t) * d(shape_of(t))
+
+
+def digamma_half_step(t):
+    """P with digamma(b + 1/2) - digamma(b) = 1/(2b) + (t/b) P."""
+    b = shape_of(t)
+    return (digamma(b + mpf(1) / 2) - digamma(b) - 1 / (2 * b)) * b / max(t, SMALL)
+
+
+def inverse_d(s):
+    """s b with D(b) = s."""
+    s = max(s, SMALL)
+    b = (3 - s + sqrt((s - 3) ** 2 + 24 * s)) / (12 * s)
+    for _ in range(60):
+        b -= (d(b) - s) / (1 / b - psi(1, b))
+    return s * b
+
+
 def weight_d(s):
     s = max(s, SMALL)
     return s**2 / (log(1 / sqrt(s)) - digamma(1 / sqrt(s)))
@@ -79,6 +108,9 @@ FITS = [
     ("shifted_d_tail", shifted_d_tail, weight_d, 5, mpf(0), mpf(1)),
     ("trigamma_excess", trigamma_excess, lambda t: 1 / trigamma_excess(t), 8, mpf(0), mpf(1)),
     ("half_step_excess", half_step_excess, lambda t: 1 / (1 / max(t, SMALL) - 1 + half_step_excess(t)), 5, mpf(0), mpf(1)),
+    ("shape_d", shape_d, lambda t: 1 / shape_d(t), 7, mpf(0), mpf(2) / 3),
+    ("digamma_half_step", digamma_half_step, lambda t: max(t, SMALL) / shape_d(t), 5, mpf(0), mpf(2) / 3),
+    ("inverse_d", inverse_d, lambda s: 1 / inverse_d(s), 7, mpf(0), -digamma(mpf(1))),
     ("stirling_tail", stirling_tail, lambda s: max(s, SMALL) ** mpf("1.5"), 4, mpf(0), mpf(1)),
 ]
 

@@ -8,7 +8,9 @@
 
 #include <cmath>
 #include <random>
+#include <span>
 
+#include "inference/mixture.h"
 #include "mapping/touch_mixture.h"
 #include "mapping/touch_update.h"
 
@@ -53,9 +55,53 @@ TouchRequest reading(TouchModel model) {
   return request;
 }
 
+/// Whether the batch gave what the scalar library gives: the posterior of the pooled belief, or each voxel's own update
+/// (every 991st voxel).
+std::string faults(Map& map, TouchModel model) {
+  const uint64_t id = add_touch(map, resolve_touch(map, reading(model)));
+  const Touch& recorded = *map.touches.find(id);
+  const size_t k = size_t(map.classes.size());
+  const std::vector<Nig> priors = nig_priors(map.properties[0], map.classes);
+  std::string fault;
+  if (touch_plane_bytes(map) != 3 * sizeof(Plane) * recorded.region.blocks()) fault = "planes in untouched blocks";
+  if (model == TouchModel::material) {
+    const double psi = recorded.request.value;
+    const MaterialPosterior scalar =
+        material_posterior(pooled_belief(map, recorded.region), priors, std::span(&psi, 1), {}, map.properties[0].rho);
+    const Belief belief = Beliefs(map).of(recorded.region, {0});
+    for (size_t c = 0; c < k; ++c)
+      if (std::abs(belief.class_probability[c] - scalar.belief.p[c]) > 1e-12) fault = "another posterior";
+  } else {
+    size_t n = 0;
+    for (const MixtureBlock& block : mixture_state(map, recorded.region).blocks)
+      for (size_t i = 0; i < block.voxels; ++i) {
+        if (n++ % 991 != 0) continue;
+        std::vector<double> vision;
+        size_t left = i;
+        for_each_bit(block.mask, [&](int offset) {
+          if (left-- != 0) return;
+          vision.assign(k, 1.0);
+          for (const EvidencePlane& e : map.store.get(block.coord)->evidence)
+            vision[e.slot] += double(e.counts->value[offset]);
+        });
+        const MixtureUpdate scalar = mixture_update(vision, priors, recorded.request.value, 0, Projection::kl);
+        for (size_t c = 0; c < k; ++c)
+          if (std::abs(double(block.a[c * block.voxels + i]) - scalar.a[c]) > 1e-4 * scalar.a[c])
+            fault = "another state";
+      }
+  }
+  undo_touch(map, id);
+  map.touches.touches.clear();
+  return fault;
+}
+
 void touch(benchmark::State& state, TouchModel model) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 1);
   Map map = floor_map(int(state.range(0)), int(state.range(1)));
+  if (const std::string fault = faults(map, model); !fault.empty()) {
+    state.SkipWithError(fault.c_str());
+    return;
+  }
   size_t voxels = 0, computed = 0;
   for (auto _ : state) {
     const uint64_t id = add_touch(map, resolve_touch(map, reading(model)));

@@ -88,7 +88,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
     const auto maps = numbered_files(path / "masks", "frame-", {"." + object + ".mask.png"});
     for (FrameRecord& frame : listing.frames)
       if (const fs::path map = at_number(maps, frame.index); !map.empty())
-        frame.class_maps.push_back({id, {map, 0, 0, ImageSource::Codec::image_file}});
+        frame.class_maps.push_back({id, {.path = map}, 1});
   }
   listing.classes = ClassTable(std::move(classes));
   return listing;

@@ -101,9 +101,11 @@ void read_settings(const fs::path& file, SequenceListing& listing, std::map<std:
 
 SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   SequenceListing listing;
-  std::map<std::string, std::string> paths = {
-      {"color", "color"},         {"depth", "depth"},     {"labels", "labels"},       {"probs", "probs"},
-      {"instances", "instances"}, {"poses", "poses.txt"}, {"classes", "classes.yaml"}};
+  std::map<std::string, std::string> paths = {{"color", "color"},          {"depth", "depth"},
+                                              {"labels", "labels"},        {"probs", "probs"},
+                                              {"instances", "instances"},  {"poses", "poses.txt"},
+                                              {"classes", "classes.yaml"}, {"properties", "properties.yaml"},
+                                              {"touches", "touches.csv"}};
   const fs::path file = path / "sequence.yaml";
   try {
     read_settings(file, listing, paths);
@@ -167,6 +169,8 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   }
   if (options.classes_file.empty() && fs::exists(path / paths["classes"]))
     listing.classes = read_class_table(path / paths["classes"]);
+  if (fs::exists(path / paths["properties"])) listing.properties_file = path / paths["properties"];
+  if (fs::exists(path / paths["touches"])) listing.touches_file = path / paths["touches"];
   return listing;
 }
 

@@ -11,8 +11,10 @@
 
 #include "core/error.h"
 #include "io/atomic_file.h"
+#include "io/class_table_file.h"
 #include "io/confusion_file.h"
 #include "io/image_encode.h"
+#include "io/label_images.h"
 #include "io/property_yaml.h"
 #include "io/simulation/scene_file.h"
 #include "io/simulation/scene_mesh.h"
@@ -95,35 +97,6 @@ Image<uint16_t> depth_units(const DepthImage& depth_m, double scale) {
   return units;
 }
 
-/// Labels in 8 bits where every class of the table fits, else in 16.
-std::vector<uint8_t> label_png(const LabelImage& labels, const ClassTable& classes) {
-  const bool narrow =
-      std::all_of(classes.classes().begin(), classes.classes().end(), [](const ClassInfo& c) { return c.id < 256; });
-  if (!narrow) return encode_png(labels);
-  Image<uint8_t> bytes(labels.width(), labels.height());
-  std::copy(labels.begin(), labels.end(), bytes.begin());
-  return encode_png(bytes);
-}
-
-std::vector<uint8_t> probability_png(const ProbabilityImage& p) {
-  Image<uint16_t> planes(p.width, 2 * p.top * p.height);
-  const size_t pixels = size_t(p.width) * p.height;
-  for (size_t i = 0; i < pixels; ++i)
-    for (int r = 0; r < p.top; ++r) {
-      planes.data()[r * pixels + i] = p.class_id[i * p.top + r];
-      planes.data()[(p.top + r) * pixels + i] = uint16_t(std::lround(65535 * double(p.probability[i * p.top + r])));
-    }
-  return encode_png(planes);
-}
-
-std::string class_table_yaml(const ClassTable& classes) {
-  std::string text = "classes:\n";
-  for (const ClassInfo& c : classes.classes())
-    text += formatted("  - {id: %d, name: %s, color: [%d, %d, %d]%s}\n", c.id, c.name.c_str(), c.color.r, c.color.g,
-                      c.color.b, c.ignore ? ", ignore: true" : "");
-  return text;
-}
-
 std::string sequence_yaml(const SimulationSettings& s, const std::string& root, const std::string& labels,
                           const std::string& classes) {
   const PinholeCamera& c = s.camera;
@@ -202,16 +175,16 @@ void write_frame(const SimulationSettings& s, const ClassTable& classes, const f
   else
     write_bytes(folder / "color" / png, encode_png(view.color));
   write_bytes(folder / "instances" / png, encode_png(view.instances));
-  write_bytes(folder / "truth" / "semantic" / png, label_png(view.semantics, s.scene.semantics));
-  write_bytes(folder / "truth" / "material" / png, label_png(view.materials, s.scene.materials));
+  write_bytes(folder / "truth" / "semantic" / png, encode_labels(view.semantics, s.scene.semantics));
+  write_bytes(folder / "truth" / "material" / png, encode_labels(view.materials, s.scene.materials));
   const LabelImage& labels = s.label_set == LabelSet::semantic ? view.semantics : view.materials;
   if (!s.network) {
-    write_bytes(folder / "labels" / png, label_png(labels, classes));
+    write_bytes(folder / "labels" / png, encode_labels(labels, classes));
     return;
   }
   const NetworkOutput seen = run_network(*s.network, classes, labels, view.instances, s.seed, int64_t(i));
-  write_bytes(folder / "labels" / png, label_png(seen.labels, classes));
-  if (!seen.probabilities.empty()) write_bytes(folder / "probs" / png, probability_png(seen.probabilities));
+  write_bytes(folder / "labels" / png, encode_labels(seen.labels, classes));
+  if (!seen.probabilities.empty()) write_bytes(folder / "probs" / png, encode_probabilities(seen.probabilities));
 }
 
 bool write_sequence(const SimulationSettings& s, const fs::path& out, bool replace,

@@ -3,6 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "core/simd.h"
+#include "io/property_yaml.h"
 #include "tests/cli/command.h"
 #include "tests/support/inference_cases.h"
 
@@ -82,6 +84,100 @@ TEST_CASE("infer draws densities and fits priors") {
   CHECK(fitted.exit_code == 0);
   CHECK(json::parse(fitted.out)["classes"][0]["mean"].get<double>() == Approx(0.2));
   CHECK(run_feltmap("infer --fit-priors /no/such/file").exit_code == 4);
+}
+
+TEST_CASE("fitted priors are written as properties that a map takes, beside the table of what one touch cannot tell") {
+  const TemporaryDirectory directory;
+  const auto csv = directory.path() / "readings.csv", yaml = directory.path() / "properties.yaml";
+  std::ofstream(csv) << "class,group,value\nice,a,0.10\nice,a,0.12\nice,b,0.14\nice,b,0.16\n"
+                        "mud,a,0.11\nmud,b,0.13\nmud,b,0.15\nrock,a,0.5\nrock,a,0.52\nrock,b,0.6\nrock,b,0.58\n";
+  const CommandResult fitted =
+      run_feltmap("infer --fit-priors '" + csv.string() + "' --property mu --properties-out '" + yaml.string() + "'");
+  REQUIRE(fitted.exit_code == 0);
+  const json report = json::parse(fitted.out);
+  REQUIRE(report["inseparable"].size() == 1);
+  CHECK(report["inseparable"][0]["classes"] == json({"ice", "mud"}));
+  const PropertyTable table = read_properties(yaml);
+  REQUIRE(table.size() == 1);
+  CHECK(table[0].name == "mu");
+  CHECK(table[0].rho == Approx(report["rho"].get<double>()));
+  CHECK(table[0].priors.at("ice").mean == Approx(0.13));
+  CHECK(table[0].priors.at("rock").sd == Approx(report["classes"][2]["sd"].get<double>()));
+  CHECK(run_feltmap("infer --fit-priors '" + csv.string() + "' --properties-out /no/such/dir/p.yaml").exit_code == 4);
+}
+
+TEST_CASE("infer in single precision runs the batch kernels on the target it is told, within 1e-3 of the reference") {
+  FELTMAP_REQUIRE_DATA(reference, "../reference");
+  const auto dnig = read_json_lines(reference / "dnig_golden.jsonl");
+  const auto material = read_json_lines(reference / "material_golden.jsonl");
+  const std::string lines = text_of(reference / "dnig_golden.jsonl") + text_of(reference / "material_golden.jsonl");
+  for (const std::string& target : simd_names()) {
+    INFO(target);
+    const CommandResult result = run_feltmap("infer --precision f32 --simd " + target, lines);
+    REQUIRE(result.exit_code == 0);
+    const std::vector<json> answers = lines_of(result.out);
+    REQUIRE(answers.size() == dnig.size() + material.size());
+    double worst = 0;
+    for (size_t i = 0; i < dnig.size(); ++i) {
+      const json &expected = dnig[i]["kl"], &found = answers[i]["posterior"];
+      REQUIRE(answers[i]["valid"] == true);
+      for (size_t c = 0; c < expected["beta"].size(); ++c)
+        for (const char* field : {"kappa", "beta", "gamma"})
+          worst = std::max(worst, relative_error(found[field][c].get<double>(), expected[field][c].get<double>()));
+    }
+    CHECK(worst < 1e-3);
+    CHECK((target == "scalar" || worst > 1e-8));  // not the f64 answer
+    double worst_class = 0;
+    for (size_t i = 0; i < material.size(); ++i) {
+      const json& found = answers[dnig.size() + i]["class_probability"];
+      for (size_t c = 0; c < found.size(); ++c)
+        worst_class =
+            std::max(worst_class, std::abs(found[c].get<double>() - material[i]["class_probability"][c].get<double>()));
+    }
+    CHECK(worst_class < 1e-3);
+  }
+}
+
+TEST_CASE("a faulty line names its field and its number, whatever is wrong with it") {
+  const std::string ok =
+      R"({"prior": {"a": [1, 1], "tau": [0, 1], "kappa": [1, 1], "beta": [1, 1], "gamma": [1, 1]}, )";
+  const std::pair<std::string, std::string> faulty[] = {
+      {R"({"prior": {"a": [1, 0], "tau": [0, 1], "kappa": [1, 1], "beta": [1, 1], "gamma": [1, 1]}, "psi": 1})",
+       "prior.a[1]"},
+      {R"({"prior": {"a": [1, 1], "tau": [0, 1], "kappa": [1, -1], "beta": [1, 1], "gamma": [1, 1]}, "psi": 1})",
+       "prior.kappa[1]"},
+      {R"({"prior": {"a": [1, 1], "tau": [0, 1], "kappa": [1, 1], "beta": [NaN, 1], "gamma": [1, 1]}, "psi": 1})",
+       "prior.beta[0]"},
+      {R"({"prior": {"a": [1, 1], "tau": [0, 1], "kappa": [1, 1], "beta": [1, 1], "gamma": [1]}, "psi": 1})",
+       "prior.gamma"},
+      {R"({"prior": {"a": [], "tau": [], "kappa": [], "beta": [], "gamma": []}, "psi": 1})", "prior.tau"},
+      {ok + R"("psi": NaN})", "psi"},
+      {ok + R"("psi": 1e999})", "psi"},
+      {ok + R"("psi": 1, "sigma": -0.1})", "sigma"},
+      {ok + R"("psi": [1], "rho": 1})", "rho"},
+      {ok + R"("psi": [1], "rho": -0.1})", "rho"},
+      {ok + R"("psi": [1, 2], "sigma": [0.1]})", "sigma"},
+      {ok + R"("psi": 1, "projection": "both"})", "projection"},
+      {ok + R"("psi": 1)", "line"},
+      {R"([1, 2])", "line"},
+      {R"({"psi": 1})", "prior"},
+  };
+  std::string input;
+  for (const auto& [line, field] : faulty) input += line + "\n";
+  for (const char* precision : {"f64", "f32"}) {
+    const CommandResult result =
+        run_feltmap("infer --precision " + std::string(precision), input + ok + "\"psi\": 1}\n");
+    CHECK(result.exit_code == 0);
+    const std::vector<json> answers = lines_of(result.out);
+    REQUIRE(answers.size() == std::size(faulty) + 1);
+    for (size_t i = 0; i < std::size(faulty); ++i) {
+      INFO(faulty[i].first);
+      REQUIRE(answers[i].contains("error"));
+      CHECK(answers[i]["error"].get<std::string>().rfind(faulty[i].second + ":", 0) == 0);
+      CHECK(answers[i]["line"] == i + 1);
+    }
+    CHECK(answers.back()["valid"] == true);
+  }
 }
 
 TEST_CASE("infer refuses a precision or a target that it does not know") {

@@ -72,7 +72,7 @@ TEST_CASE("evaluate measures a known distance and defines every figure") {
   CHECK(json["completion_m"]["median"].get<double>() == Approx(0.01).epsilon(1e-3));
   CHECK(json["f_score"] == 1.0);
   for (const char* figure : {"accuracy", "completion", "precision", "recall", "f_score", "normal_consistency"})
-    CHECK(json["definitions"].contains(figure));
+    CHECK(json["definitions"]["geometry"].contains(figure));
   std::ofstream(folder.path() / "t.txt") << "0 0 0 0 0 0 1\n";
   const CommandResult culled =
       run_feltmap("evaluate " + map + " --reference-mesh " + reference + " --samples 5000 --json --trajectory " +
@@ -82,10 +82,57 @@ TEST_CASE("evaluate measures a known distance and defines every figure") {
   CHECK(nlohmann::json::parse(culled.out)["reference_seen"].get<double>() == Approx(0.7575 / 0.8).epsilon(0.01));
 }
 
+TEST_CASE(
+    "evaluate measures the labels of a stored scene, its calibration and its forecasts, and defines every figure") {
+  const TemporaryDirectory folder;
+  const std::string scene = (source_dir() / "data" / "scenes" / "ice_crossing").string();
+  const std::string out = (folder.path() / "out").string(), plot = (folder.path() / "r.svg").string();
+  REQUIRE(run_feltmap("reconstruct " + scene + " --out " + out + " --voxel-size 0.04 --quiet").exit_code == 0);
+  const CommandResult result = run_feltmap("evaluate " + out + "/map.vdb --reference-labels " + scene +
+                                           "/truth --class-images --reliability " + plot + " --reference-readings " +
+                                           scene + "/touches.csv --properties " + scene + "/properties.yaml --json");
+  INFO(result.err);
+  REQUIRE(result.exit_code == 0);
+  const auto json = nlohmann::json::parse(result.out);
+  // The network takes ice for snow, and nearly nothing else is wrong.
+  double ice = 1, snow = 0;
+  for (const auto& c : json["labels"]["classes"]) {
+    if (c["name"] == "ice") ice = c["accuracy"];
+    if (c["name"] == "snow") snow = c["accuracy"];
+  }
+  CHECK(ice < 0.2);
+  CHECK(snow > 0.7);
+  CHECK(json["labels"]["accuracy"].get<double>() > 0.5);
+  CHECK(json["calibration"]["bins"].size() == 15);
+  CHECK(json["properties"]["friction"]["readings"] == 3);
+  for (const auto& [where, figures] :
+       std::map<std::string, std::vector<std::string>>{{"labels", {"accuracy", "mean_iou", "confusion", "ece", "nll"}},
+                                                       {"properties", {"mae", "crps", "coverage_90"}}})
+    for (const std::string& figure : figures) CHECK(json["definitions"][where].contains(figure));
+  std::ifstream svg(plot);
+  CHECK_THAT(std::string(std::istreambuf_iterator<char>(svg), {}), Contains("<svg") && Contains("Reliability"));
+
+  const CommandResult images = run_feltmap("render " + out + "/map.vdb --properties " + scene +
+                                           "/properties.yaml --pose 0,0,1,-0.5,0.5,-0.5,0.5 --images "
+                                           "class,entropy,friction.mean,friction.sd --colored --json --out " +
+                                           (folder.path() / "views").string());
+  INFO(images.err);
+  REQUIRE(images.exit_code == 0);
+  const auto views = nlohmann::json::parse(images.out);
+  CHECK(views["levels"]["friction.mean"].contains("65535"));
+  for (const auto& name : views["views"][0])
+    CHECK_FALSE(cv::imread((folder.path() / "views" / name.get<std::string>()).string()).empty());
+  CHECK(views["views"][0].size() == 8);
+}
+
 TEST_CASE("evaluate without a reference, and with one that is no mesh, says so") {
   const TemporaryDirectory folder;
   const std::string map = wall_map(folder).string();
   CHECK(run_feltmap("evaluate " + map).exit_code == 3);
+  const CommandResult unlabelled = run_feltmap("evaluate " + map + " --reference-labels " +
+                                               (source_dir() / "data" / "scenes" / "table_wall" / "truth").string());
+  CHECK(unlabelled.exit_code == 3);
+  CHECK_THAT(unlabelled.err, Contains("a map with classes"));
   std::ofstream(folder.path() / "bad.ply") << "solid\n";
   const CommandResult bad =
       run_feltmap("evaluate " + map + " --reference-mesh " + (folder.path() / "bad.ply").string());

@@ -2,6 +2,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <string>
 
 #include "io/atomic_file.h"
@@ -22,7 +23,7 @@ std::string save_floor(const TemporaryDirectory& folder) {
   Map map = labelled_map(
       0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
       class_table({"wood", "snow", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 0; }, 20);
-  map.properties = read_properties(felt::test::source_dir().string() + "/data/friction.yaml");
+  map.properties = read_properties(felt::test::source_dir().string() + "/data/properties.yaml");
   const std::string path = (folder.path() / "map.vdb").string();
   save_map(map, path);
   return path;
@@ -64,6 +65,13 @@ TEST_CASE("one touch makes a slippery floor known, and undoing it gives the file
   CHECK(points[2]["reason"] == "never observed");
 
   const std::string id = touched["id"];
+  const json journal = ask("touch " + map + " --list")["touches"];
+  REQUIRE(journal.size() == 1);
+  CHECK(journal[0]["id"] == id);
+  CHECK(journal[0]["voxels"] == touched["region"]["voxels"]);
+  CHECK(journal[0]["before"]["mean"].get<double>() > 0.3);
+  CHECK(journal[0]["after"]["mean"].get<double>() < 0.25);
+  CHECK_THAT(run_feltmap("touch " + map + " --list").out, Catch::Contains(id) && Catch::Contains("snow"));
   ask("touch " + map + " --undo " + id);
   CHECK(map_hash(load_map(map)) == untouched);
   CHECK(ask("query " + map + " --at=-0.1,0.1,0")["points"][0]["class"] == "snow");
@@ -107,6 +115,39 @@ TEST_CASE("what cannot be touched is refused with one line and leaves the file a
   refused("--at 0.2,0,0", 2, "property");
   refused("--undo 0123456789abcdef", 4, "no such id");
   refused("--at 0.2,0,0 --property friction --value 0.3 --region sphere", 4, "finite radius");
+  refused("--at 0.2,0,-0.085 --property friction --value 0.3", 4, "inside of something");
+  refused("--at 0.2,0,-0.3 --property friction --value 0.3", 4, "outside the map");
+  refused("--at nan,0,0 --property friction --value 0.3", 4, "finite coordinates");
+  refused("--at 0.2,0,0 --property friction --value inf", 4, "value");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --sigma=-1", 4, "sigma");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --stamp nan", 4, "stamp");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --rho 1", 4, "rho");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --region instance", 4, "--instances");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --model magic", 2, "magic");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --region mask", 4, "--intrinsics");
+
+  const std::string pose = " --pose 1,0,0,0,0,-1,0,0,0,0,-1,1,0,0,0,1", mask = (folder.path() / "mask.png").string();
+  cv::imwrite(mask, cv::Mat(48, 64, CV_8U, cv::Scalar(255)));
+  const std::string by_mask = "--at 0.2,0,0 --property friction --value 0.3 --region mask --mask " + mask + pose;
+  refused(by_mask + " --intrinsics 60,60,32,24,640,480", 4, "size of the mask: expected 640 x 480 as its camera");
+  refused(by_mask + " --intrinsics 60,60,320,240", 4, "a camera of 64 x 48 images");
+  cv::imwrite(mask, cv::Mat(48, 64, CV_8U, cv::Scalar(0)));
+  refused(by_mask + " --intrinsics 60,60,32,24,64,48", 4, "pixels that see the map");
+}
+
+TEST_CASE("a surface that only ignored classes cover cannot be touched") {
+  const TemporaryDirectory folder;
+  Map map = labelled_map(
+      0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
+      class_table({"wood", "snow"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? -1 : 0; }, 5);
+  map.properties = read_properties(felt::test::source_dir().string() + "/data/properties.yaml");
+  const std::string path = (folder.path() / "map.vdb").string();
+  save_map(map, path);
+  const std::string before = bytes_of(path);
+  const CommandResult result = run_feltmap("touch " + path + " --at=-0.2,0,0 --property friction --value 0.3");
+  CHECK(result.exit_code == 4);
+  CHECK_THAT(result.err, Catch::Contains("without labels (an ignored class, or never labelled)"));
+  CHECK(bytes_of(path) == before);
 }
 
 TEST_CASE("the region command shows what a touch would update and writes it as a mesh") {
@@ -151,10 +192,35 @@ TEST_CASE("the friction command prints a touch line") {
   CHECK(answer["kinetic"]["mean"].get<double>() == Approx(0.3).epsilon(0.01));
   CHECK_THAT(answer["touch"].get<std::string>(), Catch::Contains("1,2,3,friction,0.3"));
   CHECK_THAT(bytes_of(plot), Catch::Contains("<svg"));
-  write_file_atomically(log, "t,fx,fy\n1,2,3\n");
-  const CommandResult result = run_feltmap("friction " + log);
-  CHECK(result.exit_code == 4);
-  CHECK_THAT(result.err, Catch::Contains("fz"));
+  CHECK_THAT(answer["normal_from"].get<std::string>(), Catch::Contains("assumed"));
+  const auto refused = [&](const std::string& text, const std::string& reason) {
+    write_file_atomically(log, text);
+    const CommandResult result = run_feltmap("friction " + log + " --cutoff 5");
+    INFO(reason);
+    CHECK(result.exit_code == 4);
+    CHECK_THAT(result.err, Catch::Contains(reason));
+  };
+  std::string hovering = "t,fx,fy,fz\n", sideways = hovering;
+  for (int i = 0; i < 100; ++i) {
+    hovering += std::to_string(i * 0.01) + ",0.1,0,0.2\n";
+    sideways += std::to_string(i * 0.01) + ",5,0,0\n";
+  }
+  refused("t,fx,fy\n1,2,3\n", "fz");
+  refused(hovering, "contact: expected at least 16 samples with a normal force of 1 N");
+  refused(sideways, "normal force: expected some");
+}
+
+TEST_CASE("a force log pressed on the map becomes a touch of it") {
+  const TemporaryDirectory folder;
+  const std::string map = save_floor(folder), touches = (folder.path() / "touches.csv").string();
+  const json answer = ask("friction " + (source_dir() / "data/friction_log.csv").string() + " --map " + map +
+                          " --at=-0.2,0,0 --touch " + touches);
+  CHECK(answer["kinetic"]["mean"].get<double>() == Approx(0.139).epsilon(0.03));
+  CHECK(answer["static"]["peak"].get<double>() > 0.16);
+  CHECK(answer["normal"][2].get<double>() == Approx(1).epsilon(1e-6));
+  const json touched = ask("touch " + map + " --file " + touches)["touches"][0];
+  CHECK(touched["after"]["class"] == "ice");
+  CHECK(touched["sigma"] == Approx(answer["kinetic"]["sd"].get<double>()).epsilon(0.01));
 }
 
 }  // namespace felt::test

@@ -56,7 +56,7 @@ void touch(Map& map, size_t i, double value) {
 
 TEST_CASE("touched labels are right as often as the exact posterior decision, in every patch the same") {
   // Vision is right in 78 % of patches and says so: (1 + n) / (8 + n) = 0.78. One reading from Table I each, rho 0.
-  const PropertyTable table = read_properties(felt::test::source_dir().string() + "/data/friction.yaml");
+  const PropertyTable table = read_properties(felt::test::source_dir().string() + "/data/properties.yaml");
   Property friction = table[0];
   friction.rho = 0;
   std::vector<std::string> names;

@@ -1,7 +1,12 @@
 #include <catch2/catch.hpp>
 #include <map>
 
+#include <tbb/global_control.h>
+
+#include "mapping/class_belief.h"
+#include "mapping/label_evidence.h"
 #include "mapping/tsdf_integrator.h"
+#include "tests/support/simd_targets.h"
 #include "tests/support/views.h"
 
 using namespace felt;
@@ -53,7 +58,7 @@ void visit_band(const Map& map, const Frame& frame, const IntegrationConfig& con
 }  // namespace
 
 TEST_CASE("class counts are exact: they equal a dictionary's, unknown and ignored ids are left out") {
-  for (const int k : {2, 40, 150}) {
+  for (const int k : {2, 40, 150, 1000}) {
     Map map(0.03, 0.12);
     map.classes = table(k);
     IntegrationScratch scratch;
@@ -153,4 +158,128 @@ TEST_CASE("a voxel behind another surface takes no label from it") {
         REQUIRE(std::min(to_ball, to_wall) < 0.06);
         REQUIRE((p.z() < 1.4 || to_wall < 0.021));  // not inside the ball's back half
       }
+}
+
+namespace {
+
+/// Top-3 probabilities of known, ignored and unknown classes, some with mass left over and some with repeated zeros.
+ProbabilityImage random_probabilities(Random& random, int width, int height, int k) {
+  ProbabilityImage image{width, height, 3, {}, {}};
+  for (int pixel = 0; pixel < width * height; ++pixel) {
+    float left = 1;
+    uint16_t first = 0;
+    for (int m = 0; m < 3; ++m) {
+      const auto id = uint16_t(3 * int(random() * (k + 1)) + (random() < 0.05));
+      const float p = id == first ? 0 : left * float(random() < 0.1 ? 1 : random());
+      first = m == 0 ? id : first;
+      left -= p;
+      image.class_id.push_back(id);
+      image.probability.push_back(p);
+    }
+  }
+  return image;
+}
+
+/// Every kind of evidence at once, one after the other: labels, probabilities, a confusion matrix, a cap, instances.
+std::string hash_of_everything() {
+  constexpr int k = 12;
+  Map map(0.03, 0.12);
+  map.classes = table(k);
+  IntegrationScratch scratch;
+  Random random(77);
+  std::vector<double> counts(k * k);
+  for (double& c : counts) c = random() < 0.7 ? 0 : std::floor(100 * random());
+  const LabelEvidence likelihood = label_evidence(counts, k, 3);
+  for (int n = 0; n < 8; ++n) {
+    Frame frame = labelled_frame(random, k);
+    frame.instances = Image<uint16_t>(frame.depth_m.width(), frame.depth_m.height());
+    for (uint16_t& id : frame.instances) id = uint16_t(4 * random());
+    IntegrationConfig config;
+    config.labels.instances = true;
+    config.labels.evidence = 0.7f;
+    config.labels.novelty_m = 0.5f;
+    config.labels.max_evidence = n % 3 == 0 ? 0 : 1.5f;
+    config.labels.likelihood = n % 4 >= 2 ? &likelihood : nullptr;
+    if (n % 2 == 1)
+      frame.probabilities = random_probabilities(random, frame.depth_m.width(), frame.depth_m.height(), k);
+    integrate(map, frame, config, scratch);
+  }
+  return map_hash(map);
+}
+
+}  // namespace
+
+TEST_CASE("every SIMD target and number of threads stores the same evidence, bit for bit") {
+  choose_simd("scalar", "test");
+  const std::string expected = hash_of_everything();
+  choose_simd("", "test");
+  test::on_every_simd_target([&](const std::string& target) {
+    INFO(target);
+    for (const size_t threads : {1, 2, 3, 8}) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+      CHECK(hash_of_everything() == expected);
+    }
+  });
+}
+
+TEST_CASE("probabilities are exact: their evidence equals a dictionary's, and no mass is lost or made") {
+  for (const int k : {2, 3, 40, 1000}) {
+    Map map(0.03, 0.12);
+    map.classes = table(k);
+    IntegrationScratch scratch;
+    Random random{uint64_t(k) + 5};
+    std::map<Index3, std::vector<double>> dictionary;
+    double mass = 0;
+    for (int n = 0; n < 3; ++n) {
+      Frame frame = ball_before_wall(jittered_pose(random));
+      frame.probabilities = random_probabilities(random, frame.depth_m.width(), frame.depth_m.height(), k);
+      integrate(map, frame, {}, scratch);
+      visit_band(map, frame, {}, [&](const Index3& voxel, int pixel) {
+        // In plain words: named classes get their probability, the others evenly what is missing from one.
+        std::map<int, double> named;
+        double sum = 0;
+        for (int m = 0; m < 3; ++m) {
+          const uint16_t id = frame.probabilities.class_id[size_t(3 * pixel + m)];
+          const double p = frame.probabilities.probability[size_t(3 * pixel + m)];
+          sum += p;
+          if (p > 0 && id % 3 == 0 && id > 0) named[id / 3 - 1] += p;
+        }
+        if (named.empty()) return;
+        double rest = sum < 1 - 3 / 65535.0 ? 1 - sum : 0;
+        for (bool again = true; again && int(named.size()) < k;) {
+          again = false;
+          for (const auto& [slot, p] : named)
+            if (p < rest / (k - int(named.size()))) {
+              rest += p;
+              named.erase(slot);
+              again = true;
+              break;
+            }
+        }
+        std::vector<double>& alpha = dictionary[voxel];
+        alpha.resize(size_t(k), 0.0);
+        for (int slot = 0; slot < k; ++slot) {
+          const auto at = named.find(slot);
+          const double add = at != named.end()       ? at->second
+                             : int(named.size()) < k ? rest / (k - int(named.size()))
+                                                     : 0;
+          alpha[size_t(slot)] += add;
+          mass += add;
+        }
+      });
+    }
+    REQUIRE(dictionary.size() > 1000);
+    double stored = 0;
+    for (const Block& block : map.store.blocks())
+      for (int i = 0; i < kBlockVoxels; ++i) stored += double(total_evidence(block, i));
+    CHECK(stored == Approx(mass).epsilon(1e-4));
+    std::vector<double> found(static_cast<size_t>(k));
+    int checked = 0;
+    for (const auto& [voxel, expected] : dictionary) {
+      if (++checked % (k > 100 ? 50 : 3) != 0) continue;
+      class_concentration(map.store.get(block_of_voxel(voxel)), offset_in_block(voxel), map.classes, found);
+      for (int slot = 0; slot < k; ++slot)
+        REQUIRE(found[size_t(slot)] - 1 == Approx(expected[size_t(slot)]).margin(2e-6));
+    }
+  }
 }

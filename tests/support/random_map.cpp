@@ -41,6 +41,18 @@ Map random_map(const RandomMapOptions& options) {
         if (integer(0, 1) != 0) plane.counts->value[i] = real(0.0f, 20.0f);
     }
   }
+  std::mt19937_64 more(options.seed + 1);
+  const auto chance = [&](int one_in) { return more() % uint64_t(one_in) == 0; };
+  for (Block& block : map.store.blocks()) {
+    if (options.shared_evidence && !chance(3)) block.even_evidence = map.store.new_plane();
+    if (options.instances && !chance(3)) map.store.add_instance(block);
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      if (!(block.geometry->weight[i] > 0)) continue;
+      if (block.even_evidence != nullptr && chance(2)) block.even_evidence->value[i] = float(more() % 100) / 8;
+      if (block.instance != nullptr && chance(2))
+        block.instance->id[i] = uint16_t(1 + more() % 0xffff), block.instance->votes[i] = uint16_t(more() % 9);
+    }
+  }
   for (int64_t frame = 0; frame < 20; frame += 2)
     record_frame(map.frames, "0123abcd", "{\"voxel_size_m\":0.02}", frame);
   record_frame(map.frames, "0123abcd", "{\"voxel_size_m\":0.02}", 55);

@@ -11,6 +11,7 @@ struct RandomMapOptions {
   int blocks = 10;
   int classes = 0;  ///< named "class 0", "class 1", ...
   bool color = true;
+  bool shared_evidence = false, instances = false;  ///< do not change what else is there
 };
 
 /// A map with every kind of state in random blocks around the origin: unobserved voxels in observed blocks, blocks

@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <vector>
 
 namespace felt {
 namespace {
@@ -44,6 +45,32 @@ TEST_CASE("the closed form for noise is used only where it errs little; elsewher
   }
   // The quadrature is not idle: there the closed form errs by nats.
   CHECK(worst_outside > 2);
+}
+
+TEST_CASE("several noisy readings of one region: where the closed form is used it errs little") {
+  const std::vector<double> pattern{-0.6, 1.1, 0.2, -1.3, 0.7};
+  double worst_outside = 0;
+  for (double rho : {0.0, 0.5}) {
+    for (double z : {0.0, 1.0, 3.0}) {
+      for (double ratio : {0.01, 0.03, 0.1, 0.33, 1.0, 3.0, 10.0}) {
+        const Nig prior{0, 50, 25, 25};
+        const double noise = std::sqrt(ratio), common = z * std::sqrt(1 / prior.kappa + rho);
+        std::vector<double> psi;
+        for (double p : pattern) psi.push_back(common + p * std::sqrt(1 - rho + ratio));
+        const std::vector<double> noise_sd(psi.size(), noise);
+        const MaterialClass closed = tempered_material_class(prior, psi, noise_sd, rho);
+        const MaterialClass exact = quadrature_material_class(prior, psi, noise_sd, rho);
+        const double error = closed.log_evidence - exact.log_evidence;
+        const bool by_quadrature = needs_quadrature(prior, psi, noise_sd, rho);
+        INFO("rho " << rho << ", noise^2/v " << ratio << ", mean at z " << z << ": log evidence " << error << ", tau "
+                    << closed.posterior.tau - exact.posterior.tau << (by_quadrature ? " (quadrature used)" : ""));
+        CHECK((by_quadrature || std::abs(error) < 0.03));
+        CHECK((by_quadrature || std::abs(closed.posterior.tau - exact.posterior.tau) < 0.03));
+        if (by_quadrature) worst_outside = std::max(worst_outside, std::abs(error));
+      }
+    }
+  }
+  CHECK(worst_outside > 0.1);
 }
 
 TEST_CASE("the closed form of one reading is the tempered update, whatever the correlation") {

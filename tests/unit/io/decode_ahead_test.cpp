@@ -18,6 +18,7 @@ public:
   }
   const SequenceInfo& info() const override { return info_; }
   int64_t size() const override { return count_; }
+  FrameName name(int64_t i) const override { return {i, double(i)}; }
   ReadResult read(int64_t i) const override {
     const int64_t ahead = ++started - taken;
     for (int64_t seen = most_ahead; ahead > seen && !most_ahead.compare_exchange_weak(seen, ahead);) {

@@ -24,7 +24,7 @@ std::string message_of(const std::string& text) {
 }  // namespace
 
 TEST_CASE("the shipped friction table holds the published eight materials") {
-  const PropertyTable table = read_properties(felt::test::source_dir().string() + "/data/friction.yaml");
+  const PropertyTable table = read_properties(felt::test::source_dir().string() + "/data/properties.yaml");
   REQUIRE(table.size() == 1);
   const Property& p = table[*table.index_of("friction")];
   CHECK(p.priors.size() == 8);

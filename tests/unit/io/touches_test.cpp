@@ -19,7 +19,7 @@ Map floor_map() {
   Map map = labelled_map(
       0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
       class_table({"wood", "snow", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 0; });
-  map.properties = read_properties(felt::test::source_dir().string() + "/data/friction.yaml");
+  map.properties = read_properties(felt::test::source_dir().string() + "/data/properties.yaml");
   return map;
 }
 
@@ -54,7 +54,8 @@ TEST_CASE("a pixel touch lands where its frame saw the surface, one outside the 
   frame.depth_m = DepthImage(101, 101, 1.0f);
   frame.T_world_camera.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();
   frame.T_world_camera.translation() = Eigen::Vector3d(0, 0, 1);
-  const TouchedSequence sequence{0, 40, 0, 4, [&](const RecordedTouch&) { return std::optional(frame); }};
+  const TouchedSequence sequence{{{0, 0}, {1, 10}, {2, 20}, {3, 30}, {4, 40}},
+                                 [&](size_t place) { return place == 3 ? std::optional(frame) : std::nullopt; }};
   const auto outcomes = apply_recorded_touches(
       map,
       parse_touches("stamp,u,v,property,value\n30,30,50,friction,0.2\n50,30,50,friction,0.2\n30,500,50,friction,0.2\n",

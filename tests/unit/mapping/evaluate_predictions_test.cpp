@@ -7,7 +7,7 @@
 using namespace felt;
 
 TEST_CASE("accuracy, recall, precision and IoU follow from the counts") {
-  ConfusionMatrix m(3);
+  LabelCounts m(3);
   const int counts[2][4] = {{6, 2, 0, 2}, {1, 3, 0, 0}};  // class 2 never occurs; the last column: no prediction
   for (int t = 0; t < 2; ++t)
     for (int p = 0; p < 4; ++p)
@@ -23,8 +23,18 @@ TEST_CASE("accuracy, recall, precision and IoU follow from the counts") {
   CHECK(std::isnan(m.recall(2)));
   CHECK(std::isnan(m.iou(2)));
   CHECK(m.mean_iou() == Approx((6 / 11.0 + 0.5) / 2));
+  CHECK(m.mean_iou_of_all() == Approx((6 / 11.0 + 0.5) / 2));
+  LabelCounts twice = m;
+  twice += m;
+  CHECK(twice.total() == 28);
+  CHECK(twice.iou(0) == m.iou(0));
+  m.add(0, 2);  // class 2 is predicted now, and never right
+  CHECK(m.mean_iou() == Approx((6 / 12.0 + 0.5) / 2));
+  CHECK(m.mean_iou_of_all() == Approx((6 / 12.0 + 0.5) / 3));
+  CHECK(m.count(0, 2) == 1);
+  m = twice;
   CHECK(m.mean_recall() == Approx((0.6 + 0.75) / 2));
-  CHECK(std::isnan(ConfusionMatrix(2).pixel_accuracy()));
+  CHECK(std::isnan(LabelCounts(2).pixel_accuracy()));
 }
 
 TEST_CASE("forecasts that are right as often as they say have no calibration error, boastful ones have") {
@@ -87,8 +97,7 @@ TEST_CASE("property scores of normal forecasts are those of the closed form") {
   std::normal_distribution<double> normal;
   for (int i = 0; i < 20000; ++i) many.add(normal(random), 0, 0, quantiles);
   CHECK(many.coverage(0) == Approx(0.5).margin(0.015));
-  CHECK(many.coverage(1) == Approx(0.8).margin(0.015));
-  CHECK(many.coverage(2) == Approx(0.95).margin(0.01));
+  CHECK(many.coverage(1) == Approx(0.9).margin(0.01));
 }
 
 TEST_CASE("image metrics of known images") {

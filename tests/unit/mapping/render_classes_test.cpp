@@ -20,14 +20,16 @@ TEST_CASE("class and entropy images show the evidence of the voxels that are see
     }
   const PinholeCamera camera{20, 20, 10, 10, 21, 21};
   const RenderedView view = RayCaster(map).render(camera, Eigen::Isometry3d::Identity());
-  const LabelImage label = class_image(map, view.voxel);
-  const Image<float> entropy = entropy_image(map, view.voxel);
+  const VoxelBeliefs beliefs(map);
+  const LabelImage label = class_image(map, beliefs, view.voxel);
+  const Image<float> entropy = entropy_image(beliefs, view.voxel);
   CHECK(label(14, 10) == 7);
   CHECK(label(14, 15) == 9);
   CHECK(label(2, 10) == 0xffff);
   CHECK(entropy(2, 10) == Approx(std::log(2)));
   CHECK(entropy(14, 10) == Approx(-0.9 * std::log(0.9) - 0.1 * std::log(0.1)));
-  const auto p = class_probability(map, view.voxel(14, 15));
+  std::vector<double> p(2);
+  beliefs.class_probability(view.voxel(14, 15), p);
   CHECK(p[0] == Approx(0.1));
   CHECK(p[1] == Approx(0.9));
 }

@@ -188,11 +188,12 @@ TEST_CASE("every fault of a confusion matrix is reported with its line") {
   using Catch::Contains;
   CHECK_THAT(message(""), Contains("row 'ice'") && Contains("row 'snow'"));
   CHECK_THAT(message("x,ice\nice,1\nsnow,1\n"), Contains("m.csv:1") && Contains("column 'snow'"));
-  CHECK_THAT(message("x,ice,snow\nice,1,a\nsnow,1\n"), Contains("m.csv:2: cell 3") && Contains("m.csv:3: cells"));
+  CHECK_THAT(message("x,ice,snow\nice,1,a\nsnow,1\n"), Contains("m.csv:2: number 2") && Contains("m.csv:3: numbers"));
   CHECK_THAT(message("x,ice,snow\nice,1,0\nice,1,0\nfog,1,1\n"),
              Contains("again") && Contains("'fog'") && Contains("row 'snow'"));
-  CHECK_THAT(message("x,ice,snow\nice,-1,2\nsnow,0,0\n"), Contains("row 1") && Contains("row 2"));
-  CHECK_THAT(message("x,ice,snow\nice,nan,2\nsnow,1,0\n"), Contains("row 1"));
+  CHECK_THAT(message("x,ice,snow\nice,-1,2\nsnow,0,nan\n"),
+             Contains("m.csv:2: number 1") && Contains("m.csv:3: number 2"));
+  CHECK_THAT(message("x,ice,snow\nice,1,2\nsnow,0,0\n"), Contains("row 2"));
 }
 
 TEST_CASE("class shares are the shares of the pixels") {

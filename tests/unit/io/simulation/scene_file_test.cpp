@@ -133,6 +133,6 @@ TEST_CASE("readings of one thing share the stated part of their variance") {
 }
 
 TEST_CASE("the simulator's friction table is the one that ships") {
-  const PropertyTable shipped = read_properties(test::source_dir() / "data" / "friction.yaml");
+  const PropertyTable shipped = read_properties(test::source_dir() / "data" / "properties.yaml");
   CHECK(simulated_properties() == shipped);
 }

@@ -1,0 +1,214 @@
+// How honest a map's class probabilities are on frames it has not seen, by the settings of label fusion: the figures
+// behind the defaults (docs/semantics.md). Every fourth frame builds the map, every fourth teaches the confusion
+// matrix, every fourth is held out: the map is rendered from there and compared, pixel by pixel, with the true labels.
+//   bench_label_calibration [icl | house]
+#include <cmath>
+#include <functional>
+#include <numeric>
+
+#include "bench/support/bench.h"
+#include "core/simd.h"
+#include "io/simulation/label_network.h"
+#include "mapping/class_belief.h"
+#include "mapping/evaluate_predictions.h"
+#include "mapping/label_calibration.h"
+#include "mapping/label_evidence.h"
+#include "mapping/render.h"
+#include "mapping/tsdf_integrator.h"
+
+namespace {
+
+using namespace felt;
+
+constexpr double kVoxel = 0.02;
+constexpr int kSmaller = 4;  // rendered at a quarter of the width and height
+
+/// One network on one recording.
+struct Experiment {
+  std::string name;
+  ClassTable classes;
+  std::vector<Frame> building;            // labelled by the network
+  std::vector<Frame> teaching, held_out;  // likewise, with their true labels
+  std::vector<LabelImage> teaching_truth, held_out_truth;
+  std::vector<Image<VoxelRef>> seen;  // by held-out frame: what the map shows there
+};
+
+struct Settings {
+  std::string name;
+  LabelConfig labels;
+  double prior = 1;
+  bool confusion = false;
+};
+
+void add(Experiment& e, size_t position, Frame frame, LabelImage truth) {
+  switch (position % 4) {
+    case 0:
+      e.building.push_back(std::move(frame));
+      return;
+    case 1:
+      e.teaching.push_back(std::move(frame));
+      e.teaching_truth.push_back(std::move(truth));
+      return;
+    case 2:
+      e.held_out.push_back(std::move(frame));
+      e.held_out_truth.push_back(std::move(truth));
+      return;
+    default:
+      return;
+  }
+}
+
+Experiment recorded_network(const std::string& name, const std::string& labels, const std::string& confidence) {
+  const std::filesystem::path folder = bench::recorded(name);
+  SequenceOptions options{.read_color = false};
+  options.labels_dir = folder / labels;
+  if (!confidence.empty()) options.probs_dir = folder / confidence;
+  const auto predicted = open_sequence(folder, options), truth = open_sequence(folder, {.read_color = false});
+  Experiment e{confidence.empty() ? name + ", labels" : name + ", labels with confidence", predicted->info().classes};
+  for (int64_t i = 0; i < predicted->size(); ++i) {
+    ReadResult frame = predicted->read(i), true_frame = truth->read(i);
+    add(e, size_t(i), std::move(std::get<Frame>(frame)), std::move(std::get<Frame>(true_frame).labels));
+  }
+  return e;
+}
+
+Experiment simulated_network(const std::vector<Frame>& frames, const ClassTable& classes, const std::string& preset,
+                             ErrorScale scale, const std::string& scale_name) {
+  Experiment e{"house, " + preset + " network, mistakes by " + scale_name, classes};
+  const LabelNetwork network{preset_confusion(preset, classes), scale};
+  for (size_t i = 0; i < frames.size(); ++i) {
+    if (i % 4 == 3) continue;
+    Frame frame = frames[i];
+    LabelImage truth = frame.labels;
+    frame.labels = run_network(network, classes, truth, frame.instances, 1, frame.index).labels;
+    frame.instances = {};
+    add(e, i, std::move(frame), std::move(truth));
+  }
+  return e;
+}
+
+Map fused(const Experiment& e, const Settings& s, const LabelEvidence* likelihood) {
+  Map map(kVoxel, 4 * kVoxel);
+  std::vector<ClassInfo> classes = e.classes.classes();
+  for (ClassInfo& c : classes) c.prior = s.prior;
+  map.classes = ClassTable(classes);
+  IntegrationConfig config;
+  config.labels = s.labels;
+  config.labels.likelihood = s.confusion ? likelihood : nullptr;
+  IntegrationScratch scratch;
+  for (const Frame& frame : e.building) integrate(map, frame, config, scratch);
+  return map;
+}
+
+/// What the held-out cameras see of the geometry. Blocks are numbered alike whatever the labels.
+void render_held_out(Experiment& e) {
+  const Map map = fused(e, {}, nullptr);
+  const RayCaster caster(map);
+  for (const Frame& frame : e.held_out) {
+    PinholeCamera camera = frame.camera;
+    camera.fx /= kSmaller, camera.fy /= kSmaller, camera.cx /= kSmaller, camera.cy /= kSmaller;
+    camera.width /= kSmaller, camera.height /= kSmaller;
+    e.seen.push_back(
+        caster.render(camera, frame.T_world_camera, {.max_depth_m = 4, .normals = false, .color = false}).voxel);
+  }
+}
+
+struct Scores {
+  double accuracy = 0, ece = 0, brier = 0, nll = 0;
+};
+
+Scores score(const Experiment& e, const Map& map) {
+  CalibrationScores scores;
+  std::vector<double> p(size_t(map.classes.size()));
+  uint64_t right = 0, all = 0;
+  for (size_t n = 0; n < e.held_out.size(); ++n)
+    for (int v = 0; v < e.seen[n].height(); ++v)
+      for (int u = 0; u < e.seen[n].width(); ++u) {
+        const VoxelRef voxel = e.seen[n](u, v);
+        const uint16_t truth = map.classes.slot_of_id(e.held_out_truth[n](u * kSmaller, v * kSmaller));
+        if (voxel.block == BlockStore::kNone || truth == ClassTable::kNoSlot) continue;
+        const Block& block = map.store[voxel.block];
+        if (class_belief(block, voxel.offset, map.classes).slot == ClassTable::kNoSlot) continue;
+        class_concentration(&block, voxel.offset, map.classes, p);
+        const double sum = std::accumulate(p.begin(), p.end(), 0.0);
+        for (double& x : p) x /= sum;
+        scores.add(p, truth);
+        right += size_t(std::max_element(p.begin(), p.end()) - p.begin()) == truth;
+        ++all;
+      }
+  return {double(right) / double(all), scores.ece(), scores.brier(), scores.nll()};
+}
+
+std::vector<Settings> all_settings(double k) {
+  std::vector<Settings> all;
+  const auto with = [&](const std::string& name, const std::function<void(Settings&)>& change) {
+    Settings s{name, {}, 1, false};
+    s.labels.max_evidence = 0, s.labels.evidence = 1;
+    change(s);
+    all.push_back(s);
+  };
+  with("one-hot, no cap (the paper)", [](Settings&) {});
+  for (const double prior : {0.1, 1 / k}) {
+    with("prior " + std::to_string(prior).substr(0, 5), [&](Settings& s) { s.prior = prior; });
+  }
+  for (const float evidence : {0.1f, 0.3f})
+    with("evidence " + std::to_string(evidence).substr(0, 3), [&](Settings& s) { s.labels.evidence = evidence; });
+  for (const float cap : {5.0f, 10.0f, 20.0f, 50.0f})
+    with("cap " + std::to_string(int(cap)), [&](Settings& s) { s.labels.max_evidence = cap; });
+  for (const float cap : {5.0f, 10.0f, 20.0f, 50.0f})
+    with("prior 0.1, cap " + std::to_string(int(cap)),
+         [&](Settings& s) { s.prior = 0.1, s.labels.max_evidence = cap; });
+  with("novelty 0.1 m, 10 deg", [](Settings& s) { s.labels.novelty_m = 0.1f, s.labels.novelty_deg = 10; });
+  with("confusion", [](Settings& s) { s.confusion = true; });
+  with("confusion, prior 0.1", [](Settings& s) { s.confusion = true, s.prior = 0.1; });
+  for (const float cap : {10.0f, 20.0f, 50.0f})
+    with("confusion, prior 0.1, cap " + std::to_string(int(cap)),
+         [&](Settings& s) { s.confusion = true, s.prior = 0.1, s.labels.max_evidence = cap; });
+  with("confusion, prior 1/k", [&](Settings& s) { s.confusion = true, s.prior = 1 / k; });
+  with("confusion, prior 0.1, novelty", [](Settings& s) {
+    s.confusion = true, s.prior = 0.1;
+    s.labels.novelty_m = 0.1f, s.labels.novelty_deg = 10;
+  });
+  return all;
+}
+
+void run(Experiment e) {
+  render_held_out(e);
+  ConfusionCounts taught(e.classes.size()), held_out(e.classes.size());
+  for (size_t n = 0; n < e.teaching.size(); ++n) count_confusion(e.teaching[n], e.teaching_truth[n], e.classes, taught);
+  for (size_t n = 0; n < e.held_out.size(); ++n)
+    count_confusion(e.held_out[n], e.held_out_truth[n], e.classes, held_out);
+  const LabelEvidence likelihood = label_evidence(taught.pixels, taught.k);
+  const ConfusionScores frame = score_confusion(taught, held_out);
+  std::printf("\n%s: %d classes, %zu frames build, %zu held out\n\n", e.name.c_str(), e.classes.size(),
+              e.building.size(), e.held_out.size());
+  std::printf("| settings | accuracy | ECE | Brier | NLL |\n|---|---|---|---|---|\n");
+  std::printf("| the network's single frames, through its confusion matrix | %.3f | %.3f | %.3f | %.3f |\n",
+              frame.accuracy, frame.ece, frame.brier, frame.nll);
+  for (const Settings& s : all_settings(e.classes.size())) {
+    const Scores scores = score(e, fused(e, s, &likelihood));
+    std::printf("| %s | %.3f | %.3f | %.3f | %.3f |\n", s.name.c_str(), scores.accuracy, scores.ece, scores.brier,
+                scores.nll);
+    std::fflush(stdout);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  apply_simd_choice();
+  const std::string wanted = argc > 1 ? argv[1] : "";
+  if (wanted.empty() || wanted == "icl") {
+    run(recorded_network("icl_livingroom_maskrcnn", "pred_label", ""));
+    run(recorded_network("icl_livingroom_maskrcnn", "pred_label", "pred_score"));
+  }
+  if (wanted.empty() || wanted == "house") {
+    const std::vector<Frame> frames = bench::decoded("house_living_rendered", {.read_color = false});
+    const ClassTable classes =
+        open_sequence(bench::recorded("house_living_rendered"), {.read_color = false})->info().classes;
+    for (const char* preset : {"good", "medium", "poor"})
+      run(simulated_network(frames, classes, preset, ErrorScale::segment, "thing and frame"));
+    run(simulated_network(frames, classes, "medium", ErrorScale::pixel, "pixel"));
+    run(simulated_network(frames, classes, "medium", ErrorScale::scene, "thing in all frames"));
+  }
+}

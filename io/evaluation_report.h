@@ -1,0 +1,30 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/class_table.h"
+#include "io/plot_svg.h"
+#include "mapping/evaluate_geometry.h"
+#include "mapping/evaluate_labels.h"
+
+namespace felt {
+
+// Figures of an evaluation as JSON, and what each of them is (docs/evaluation.md). Figures that do not exist are null.
+
+nlohmann::ordered_json geometry_json(const GeometryScores& scores);
+nlohmann::ordered_json geometry_definitions(const GeometryOptions& options, bool with_cameras);
+
+/// `labels`: accuracies and IoU with the confusion matrix; `calibration` and `class_images` where there are any.
+nlohmann::ordered_json label_json(const LabelScores& scores, const ClassTable& classes);
+/// `where`: "a pixel" or "a sample", for the words.
+nlohmann::ordered_json label_definitions(const LabelScores& scores, const std::string& what_counts);
+
+nlohmann::ordered_json property_json(const PropertyScores& scores);
+nlohmann::ordered_json property_definitions();
+
+/// Reliability diagram: accuracy against confidence by bin, and the share of predictions in each bin.
+std::vector<Plot> reliability_plots(const CalibrationScores& scores);
+
+}  // namespace felt

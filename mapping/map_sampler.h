@@ -1,0 +1,74 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/image.h"
+#include "mapping/block_index.h"
+#include "mapping/map.h"
+#include "mapping/render.h"
+
+namespace felt {
+
+inline int32_t floor_int(double x) {
+  const auto i = int32_t(x);
+  return i - (x < double(i));
+}
+inline Index3 floor_index(const Eigen::Vector3d& p) { return {floor_int(p.x()), floor_int(p.y()), floor_int(p.z())}; }
+
+/// Trilinear value between the corners of a cell, numbered dx << 2 | dy << 1 | dz, at a point of it (0 to 1 each).
+template <typename T>
+T trilinear(const T (&d)[8], T x, T y, T z) {
+  const T d00 = d[0] + z * (d[1] - d[0]), d01 = d[2] + z * (d[3] - d[2]);
+  const T d10 = d[4] + z * (d[5] - d[4]), d11 = d[6] + z * (d[7] - d[6]);
+  const T d0 = d00 + y * (d01 - d00), d1 = d10 + y * (d11 - d10);
+  return d0 + x * (d1 - d0);
+}
+
+/// Reads a map at real voxel coordinates through its BlockIndex, remembering the group of blocks it last looked at.
+/// One a task.
+class MapSampler {
+public:
+  MapSampler(const Map& map, const BlockIndex& index, float min_weight)
+      : index_(index), store_(map.store), min_weight_(min_weight), per_voxel_(float(1 / map.voxel_size_m)) {}
+
+  const BlockIndex::Group* group(const Index3& coord) {
+    if (!known_ || coord != group_coord_) {
+      group_ = index_.group(coord);
+      group_coord_ = coord;
+      known_ = true;
+    }
+    return group_;
+  }
+  uint32_t find(const BlockCoord& block) {
+    const BlockIndex::Group* g = group(block_of_voxel(block));
+    return g == nullptr ? BlockIndex::kNone : g->block[size_t(offset_in_block(block))];
+  }
+
+  /// The eight voxels around a cell. False where one is in no block.
+  bool corners(const Index3& base, std::array<VoxelRef, 8>& out);
+  /// Signed distances of a cell's corners in voxels; false where one was not observed.
+  bool distances(const Index3& base, float (&d)[8]);
+  /// Trilinear signed distance in voxels, NaN where one of the eight voxels was not observed.
+  float distance(const Eigen::Vector3d& p);
+  /// Unit gradient of the trilinear distance, zero where there is none: from the four corners of a tetrahedron around
+  /// the point; at the limit of what was observed from differences along the axes, one-sided where need be.
+  Eigen::Vector3f normal(const Eigen::Vector3d& p);
+  /// Colour between the voxels around a point that have one; a = 0 where none has.
+  Rgba8 color(const Eigen::Vector3d& p);
+  VoxelRef nearest(const Eigen::Vector3d& p);
+
+  const BlockIndex& index() const { return index_; }
+
+private:
+  const BlockIndex& index_;
+  const BlockStore& store_;
+  float min_weight_, per_voxel_;
+  const BlockIndex::Group* group_ = nullptr;
+  Index3 group_coord_;
+  bool known_ = false;
+};
+
+}  // namespace felt

@@ -1,0 +1,156 @@
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "tests/cli/command.h"
+#include "tests/support/data.h"
+#include "tests/support/onnx_model.h"
+
+namespace felt::test {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::string quoted(const fs::path& path) { return "'" + path.string() + "'"; }
+
+std::string file_text(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+/// A stored scene and a network of three colours.
+struct Setting {
+  TemporaryDirectory folder;
+  fs::path sequence = source_dir() / "data" / "scenes" / "room";
+  fs::path net = write_net(folder.path(), nearest_color_net({{{.8f, .7f, .6f}, {.3f, .2f, .2f}, {.3f, .5f, .3f}}}),
+                           {"bright", "dark", "green"});
+  fs::path classes = folder.path() / "colours.yaml";
+  fs::path out = folder.path() / "segmented";
+  Setting() {
+    std::ofstream(classes) << "classes:\n  - {id: 0, name: none, ignore: true}\n  - {id: 4, name: bright}\n"
+                              "  - {id: 9, name: dark}\n  - {id: 2, name: green}\n";
+  }
+  CommandResult segment(const std::string& more) const {
+    return run_feltmap("segment " + quoted(sequence) + " --net " + quoted(net) + " --classes " + quoted(classes) +
+                       " --out " + quoted(out) + " --json " + more);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("segment writes label images that reconstruct reads, and goes on where it was left") {
+  const Setting setting;
+  const CommandResult first = setting.segment("--frames 0:2");
+  INFO(first.err);
+  REQUIRE(first.exit_code == 0);
+  CHECK(json::parse(first.out)["frames"]["written"] == 2);
+  const fs::path kept = setting.out / "labels" / "000001.png";
+  const cv::Mat labels = cv::imread(kept.string(), cv::IMREAD_UNCHANGED);
+  REQUIRE(labels.cols == 192);
+  REQUIRE(labels.rows == 144);
+  CHECK(cv::countNonZero((labels == 4) | (labels == 9) | (labels == 2)) == 192 * 144);
+  CHECK(cv::countNonZero(labels == 4) > 1000);
+  CHECK(cv::countNonZero(labels == 9) > 1000);
+
+  const auto written = fs::last_write_time(kept);
+  const CommandResult second = setting.segment("--frames 0:4");
+  REQUIRE(second.exit_code == 0);
+  const json report = json::parse(second.out);
+  CHECK(report["frames"]["written"] == 2);
+  CHECK(report["frames"]["already_there"] == 2);
+  CHECK(fs::last_write_time(kept) == written);
+
+  const std::string settings = " --frames 0:4 --quiet --json --voxel-size 0.05";
+  const CommandResult direct =
+      run_feltmap("reconstruct " + quoted(setting.sequence) + " --segmenter " + quoted(setting.net) + " --classes " +
+                  quoted(setting.classes) + " --out " + quoted(setting.folder.path() / "direct") + settings);
+  const CommandResult by_labels = run_feltmap(
+      "reconstruct " + quoted(setting.sequence) + " --labels " + quoted(setting.out / "labels") + " --classes " +
+      quoted(setting.out / "classes.yaml") + " --out " + quoted(setting.folder.path() / "labels_map") + settings);
+  INFO(direct.err << by_labels.err);
+  REQUIRE(direct.exit_code == 0);
+  REQUIRE(by_labels.exit_code == 0);
+  const json a = json::parse(direct.out), b = json::parse(by_labels.out);
+  CHECK(a["map_hash"] == b["map_hash"]);
+  CHECK(a["time_s"]["network"] > 0);
+  CHECK(b["time_s"]["network"] == 0);
+  CHECK(a["bytes"]["classes"] > 0);
+}
+
+TEST_CASE("segment does not mix images of different settings") {
+  const Setting setting;
+  REQUIRE(setting.segment("--frames 0:1").exit_code == 0);
+  const CommandResult other = setting.segment("--frames 0:1 --top 2");
+  CHECK(other.exit_code == 3);
+  CHECK(other.err.find("segment.json") != std::string::npos);
+  CHECK(fs::exists(setting.out / "labels" / "000000.png"));
+  const CommandResult forced = setting.segment("--frames 0:1 --top 2 --force");
+  REQUIRE(forced.exit_code == 0);
+  CHECK_FALSE(fs::exists(setting.out / "labels"));
+  const cv::Mat probs = cv::imread((setting.out / "probs" / "000000.png").string(), cv::IMREAD_UNCHANGED);
+  REQUIRE(probs.type() == CV_16U);
+  REQUIRE(probs.rows == 4 * 144);
+  for (int u = 0; u < probs.cols; ++u) {
+    const int first = probs.at<uint16_t>(2 * 144, u), second = probs.at<uint16_t>(3 * 144, u);
+    REQUIRE(first >= second);
+    REQUIRE(first + second <= 65536);
+  }
+  std::ofstream(setting.folder.path() / "mine") << "x";
+  const CommandResult foreign = run_feltmap("segment " + quoted(setting.sequence) + " --net " + quoted(setting.net) +
+                                            " --out " + quoted(setting.folder.path()));
+  CHECK(foreign.exit_code == 4);
+  CHECK(fs::exists(setting.folder.path() / "mine"));
+}
+
+TEST_CASE("a map does not depend on the number of threads that run the network") {
+  const Setting setting;
+  std::string hash;
+  for (const int threads : {1, 3}) {
+    const fs::path out = setting.folder.path() / std::to_string(threads);
+    const CommandResult result =
+        run_feltmap("reconstruct " + quoted(setting.sequence) + " --segmenter " + quoted(setting.net) + " --classes " +
+                    quoted(setting.classes) + " --out " + quoted(out) +
+                    " --top 3 --quiet --json --voxel-size 0.05 --frames 0:5 --threads " + std::to_string(threads));
+    INFO(result.err);
+    REQUIRE(result.exit_code == 0);
+    const std::string found = json::parse(result.out)["map_hash"];
+    CHECK((hash.empty() || hash == found));
+    hash = found;
+  }
+}
+
+TEST_CASE("a network that cannot be used ends segment and reconstruct with one line and no output") {
+  const Setting setting;
+  const auto fails = [&](int code, const std::string& said) {
+    for (const std::string& command : {std::string("segment "), std::string("reconstruct ")}) {
+      const CommandResult result =
+          run_feltmap(command + quoted(setting.sequence) + (command == "segment " ? " --net " : " --segmenter ") +
+                      quoted(setting.net) + " --classes " + quoted(setting.classes) + " --frames 0:2 --out " +
+                      quoted(setting.folder.path() / "none"));
+      INFO(result.err);
+      CHECK(result.exit_code == code);
+      CHECK(result.err.find(said) != std::string::npos);
+      CHECK(std::count(result.err.begin(), result.err.end(), '\n') == 1);
+      CHECK_FALSE(fs::exists(setting.folder.path() / "none" / "map.vdb"));
+      CHECK_FALSE(fs::exists(setting.folder.path() / "none" / "labels" / "000000.png"));
+    }
+  };
+  const std::string whole = file_text(setting.folder.path() / "net.onnx");
+  std::ofstream(setting.folder.path() / "net.onnx", std::ios::binary) << whole.substr(0, whole.size() / 2);
+  fails(4, "net.onnx");
+  fs::remove(setting.folder.path() / "net.onnx");
+  fails(3, "net.onnx");
+  TestNet net = nearest_color_net({{{.8f, .7f, .6f}, {.3f, .2f, .2f}, {.3f, .5f, .3f}}});
+  net.classes[0][3] = std::nanf("");
+  net.softmax = false;
+  write_net(setting.folder.path(), net, {"bright", "dark", "green"});
+  fails(4, "output prob, frame 0");
+  write_net(setting.folder.path(), nearest_color_net({{{1, 1, 1}, {0, 0, 0}}}), {"bright", "purple"});
+  fails(3, "purple");
+}
+
+}  // namespace felt::test

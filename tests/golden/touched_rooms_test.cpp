@@ -1,0 +1,266 @@
+// Touches in simulated rooms: labels from a network of known confusion, readings from the friction table.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "inference/decision.h"
+#include "io/open_sequence.h"
+#include "io/simulation/label_network.h"
+#include "io/simulation/render_sequence.h"
+#include "io/simulation/scene_file.h"
+#include "io/simulation/touches.h"
+#include "io/simulation/trajectory.h"
+#include "mapping/property_view.h"
+#include "mapping/touch_update.h"
+#include "mapping/tsdf_integrator.h"
+#include "tests/support/data.h"
+
+using namespace felt;
+using namespace felt::test;
+
+namespace {
+
+void fuse(Map& map, const Frame& frame, float max_evidence) {
+  IntegrationConfig config;
+  config.labels.max_evidence = max_evidence;
+  IntegrationScratch scratch;
+  integrate(map, frame, config, scratch);
+}
+
+TouchRequest request_of(const SimulatedTouch& touch) {
+  TouchRequest request;
+  request.stamp_s = double(touch.frame);
+  request.point_m = touch.position_m;
+  request.property = "friction";
+  request.value = touch.value;
+  return request;
+}
+
+/// What every voxel outside of a region answers, byte for byte.
+std::string answers_outside(const Map& map, const Region& region) {
+  const auto views = std::make_shared<const std::vector<TouchView>>(touch_views(map));
+  const PropertyView friction(map, 0, views);
+  std::string bytes;
+  const auto put = [&](const auto& value) {
+    char raw[sizeof value];
+    std::memcpy(raw, &value, sizeof value);
+    bytes.append(raw, sizeof value);
+  };
+  for (const uint32_t number : map.store.sorted()) {
+    const Block& block = map.store[number];
+    const Index3 f = first_voxel(block.coord);
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      const Index3 o = voxel_of_offset(i), v{f.x + o.x, f.y + o.y, f.z + o.z};
+      if (region.contains(v)) continue;
+      const ClassBelief belief = class_belief_at(map, *views, v);
+      const PropertyEstimate estimate = friction.at(v);
+      put(belief.slot), put(belief.probability), put(belief.entropy), put(estimate.mean), put(estimate.sd);
+      put(estimate.touched);
+    }
+  }
+  return bytes;
+}
+
+/// The exact decision from the printed formulas alone: pooled counts times a Student-t of 50 degrees of freedom.
+int exact_decision(const Map& map, const Region& region, const Property& friction, double psi) {
+  const int k = map.classes.size();
+  std::vector<double> score(size_t(k), 0.0);
+  for (size_t b = 0; b < region.blocks(); ++b) {
+    const Block& block = *map.store.get(region.coord[b]);
+    for_each_bit(region.mask[b], [&](int i) {
+      for (double& s : score) s += 1;
+      for (const EvidencePlane& e : block.evidence) score[e.slot] += double(e.counts->value[i]);
+    });
+  }
+  for (int c = 0; c < k; ++c) {
+    const auto prior = friction.priors.find(map.classes.at_slot(c).name);
+    if (prior == friction.priors.end()) {
+      score[size_t(c)] = 0;
+      continue;
+    }
+    const double z = (psi - prior->second.mean) / (prior->second.sd * std::sqrt(51.0 / 50));
+    score[size_t(c)] *= std::pow(1 + z * z / 50, -25.5) / prior->second.sd;
+  }
+  return most_probable_class(score);
+}
+
+}  // namespace
+
+TEST_CASE("touched things of simulated rooms are decided as exactly, the rest of the map keeps its bits") {
+  int touched = 0, seen_right = 0, felt_right = 0;
+  for (int room = 1; room <= 5; ++room) {
+    const Scene scene = make_scene("room" + std::to_string(room));
+    const Trajectory trajectory = standard_trajectory(scene, 6);
+    const PinholeCamera camera = simulated_camera(160, 120);
+    RenderOptions options;
+    options.label_set = LabelSet::material;
+    options.with_color = false;
+    const LabelNetwork network{preset_confusion("medium", scene.materials), ErrorScale::scene};
+    Map map(0.05, 0.2);
+    map.classes = scene.materials;
+    map.properties = simulated_properties();
+    for (size_t i = 0; i < trajectory.size(); ++i) {
+      Frame frame = render_frame(scene, camera, trajectory[i], int64_t(i), options);
+      frame.labels =
+          run_network(network, scene.materials, frame.labels, frame.instances, uint64_t(room), frame.index).labels;
+      // The network is right in 78 of 100 cases, and says so however often it looks: (1 + n) / (k + n) = 0.78.
+      fuse(map, frame, float((0.78 * map.classes.size() - 1) / 0.22));
+    }
+    const std::string hash = map_hash(map);
+    TouchOptions touch_options;
+    touch_options.count = 12;
+    touch_options.seed = uint64_t(room);
+    Region reached;
+    std::vector<Touch> touches;
+    for (const SimulatedTouch& simulated :
+         simulate_touches(scene, trajectory, camera, map.properties[0], touch_options)) {
+      Touch touch;
+      try {
+        touch = resolve_touch(map, request_of(simulated));
+      } catch (const TouchError&) {
+        continue;  // a thing that the network ignored, or that no frame saw well
+      }
+      const int exact = exact_decision(map, touch.region, map.properties[0], simulated.value);
+      const int before = most_probable_class(pooled_belief(map, touch.region));
+      const uint64_t id = add_touch(map, touch);
+      const Touch& recorded = *map.touches.find(id);
+      const std::vector<uint32_t> alone{uint32_t(&recorded - map.touches.touches.data())};
+      CHECK(most_probable_class(Beliefs(map).of(recorded.region, alone).class_probability) == exact);
+      undo_touch(map, id);
+      const int truth = scene.materials.slot_of_id(simulated.material);
+      ++touched;
+      seen_right += before == truth;
+      felt_right += exact == truth;
+      reached = united(reached, touch.region);
+      touches.push_back(touch);
+    }
+    map.touches.touches.clear();
+    REQUIRE(map_hash(map) == hash);
+    const std::string before = answers_outside(map, reached);
+    for (const Touch& touch : touches) add_touch(map, touch);
+    CHECK(map_hash(map) != hash);
+    CHECK((answers_outside(map, reached) == before));
+    for (const Block& block : map.store.blocks()) CHECK(block.touch.empty() == (reached.find(block.coord) == nullptr));
+  }
+  WARN(touched << " touches; right before " << seen_right << ", after " << felt_right);
+  CHECK(touched >= 40);
+  CHECK(felt_right > seen_right);
+}
+
+TEST_CASE("regions of the stored scenes end at creases and where the material changes") {
+  for (const char* name : {"room", "table_wall", "ice_crossing"}) {
+    const std::filesystem::path folder = source_dir() / "data/scenes" / name;
+    const Scene scene = read_scene(folder / "scene.json");
+    SequenceOptions reading;
+    reading.labels_dir = folder / "truth/material";
+    reading.classes_file = folder / "truth/material.yaml";
+    reading.read_color = false;
+    const auto sequence = open_sequence(folder, reading);
+    const double voxel = 0.03;
+    Map map(voxel, 4 * voxel);
+    map.classes = sequence->info().classes;
+    map.properties = simulated_properties();
+    Trajectory trajectory;
+    for (int64_t i = 0; i < sequence->size(); ++i) {
+      const ReadResult result = sequence->read(i);
+      fuse(map, std::get<Frame>(result), 0);
+      trajectory.push_back(std::get<Frame>(result).T_world_camera);
+    }
+    TouchOptions options;
+    options.count = 16;
+    int regions = 0, flat = 0;
+    for (const SimulatedTouch& simulated :
+         simulate_touches(scene, trajectory, sequence->info().camera, map.properties[0], options)) {
+      Touch touch;
+      try {
+        touch = resolve_touch(map, request_of(simulated));
+      } catch (const TouchError&) {
+        continue;
+      }
+      ++regions;
+      const NearestSurface nearest = nearest_surface(scene, simulated.position_m);
+      const Primitive& felt_thing = scene.primitives[size_t(nearest.primitive)];
+      const bool is_flat = felt_thing.shape == ShapeKind::plane || felt_thing.shape == ShapeKind::box;
+      flat += is_flat;
+      Eigen::Vector3d normal;
+      for (int axis = 0; axis < 3; ++axis)
+        normal[axis] = signed_distance_m(felt_thing, simulated.position_m + 1e-4 * Eigen::Vector3d::Unit(axis)) -
+                       signed_distance_m(felt_thing, simulated.position_m - 1e-4 * Eigen::Vector3d::Unit(axis));
+      normal.normalize();
+      size_t other_material = 0, beyond_crease = 0;
+      for (size_t b = 0; b < touch.region.blocks(); ++b)
+        for_each_bit(touch.region.mask[b], [&](int i) {
+          const Index3 f = first_voxel(touch.region.coord[b]), o = voxel_of_offset(i);
+          const Eigen::Vector3d p = Eigen::Vector3d(f.x + o.x, f.y + o.y, f.z + o.z) * voxel;
+          double same_m = 1e9;
+          for (const Primitive& primitive : scene.primitives)
+            if (primitive.material == simulated.material)
+              same_m = std::min(same_m, std::abs(signed_distance_m(primitive, p)));
+          // Band and border voxels reach two voxels at most.
+          other_material += same_m > 2 * voxel;
+          beyond_crease += is_flat && std::abs(normal.dot(p - simulated.position_m)) > 2.5 * voxel;
+        });
+      INFO(name << ", " << felt_thing.name << " at " << simulated.position_m.transpose() << ": "
+                << touch.region.voxels() << " voxels");
+      CHECK(other_material == 0);
+      CHECK(beyond_crease == 0);
+    }
+    INFO(name);
+    CHECK(regions >= 3);
+    CHECK(flat >= 2);
+  }
+}
+TEST_CASE("a touch of a thing by its instance reaches all of that thing and nothing else") {
+  const std::filesystem::path folder = source_dir() / "data/scenes/table_wall";
+  const Scene scene = read_scene(folder / "scene.json");
+  SequenceOptions reading;
+  reading.read_color = false;
+  reading.read_instances = true;
+  const auto sequence = open_sequence(folder, reading);
+  Map map(0.03, 0.12);
+  map.classes = sequence->info().classes;
+  IntegrationConfig config;
+  config.labels.instances = true;
+  IntegrationScratch scratch;
+  for (int64_t i = 0; i < sequence->size(); ++i) integrate(map, std::get<Frame>(sequence->read(i)), config, scratch);
+
+  const Primitive* table_top = nullptr;
+  for (const Primitive& p : scene.primitives)
+    if (p.shape == ShapeKind::box && p.half_size_m.x() > 0.5 && p.half_size_m.z() < 0.1) table_top = &p;
+  REQUIRE(table_top != nullptr);
+  RegionSettings settings;
+  settings.rule = RegionRule::instance;
+  const Eigen::Vector3d on_top = table_top->T_world_shape * Eigen::Vector3d(-0.4, 0, table_top->half_size_m.z());
+  const Region region = find_region(map, find_contact(map, on_top, settings), settings);
+  settings.rule = RegionRule::connected;
+  const Region top = find_region(map, find_contact(map, on_top, settings), settings);
+  CHECK(intersected(top, region).voxels() > 0.9 * double(top.voxels()));
+
+  size_t other = 0;
+  for (size_t b = 0; b < region.blocks(); ++b)
+    for_each_bit(region.mask[b], [&](int i) {
+      const Index3 f = first_voxel(region.coord[b]), o = voxel_of_offset(i);
+      const Eigen::Vector3d p = Eigen::Vector3d(f.x + o.x, f.y + o.y, f.z + o.z) * map.voxel_size_m;
+      double distance_m = 1e9;
+      for (const Primitive& primitive : scene.primitives)
+        if (primitive.instance == table_top->instance)
+          distance_m = std::min(distance_m, std::abs(signed_distance_m(primitive, p)));
+      other += distance_m > 2 * map.voxel_size_m;
+    });
+  INFO(region.voxels() << " voxels");
+  CHECK(other == 0);
+
+  Map without(0.03, 0.12);
+  without.classes = map.classes;
+  fuse(without, std::get<Frame>(sequence->read(0)), 0);
+  fuse(without, std::get<Frame>(sequence->read(1)), 0);
+  settings.rule = RegionRule::instance;
+  const Block& seen = without.store[without.store.sorted()[without.store.size() / 2]];
+  REQUIRE(seen.instance == nullptr);
+  CHECK_THROWS_WITH(find_region(without, find_contact(without, on_top, settings), settings),
+                    Catch::Contains("--instances"));
+}
