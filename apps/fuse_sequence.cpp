@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include "mapping/ignored_classes.h"
-#include "mapping/tsdf_integrator.h"
 
 namespace felt::apps {
 
@@ -23,11 +22,9 @@ void count_unknown_ids(const Frame& frame, const ClassTable& classes, std::map<u
 
 }  // namespace
 
-FusionRecord fuse_sequence(DecodeAhead& frames, Map& map, const IntegrationConfig& config,
-                           const std::vector<uint16_t>& ignored_ids,
-                           const std::function<std::string(const FusionRecord&)>& after_frame) {
-  FusionRecord record;
-  IntegrationScratch scratch;
+void fuse_sequence(DecodeAhead& frames, const FrameSource& source, const IntegrationConfig& config,
+                   const std::vector<uint16_t>& ignored_ids, Map& map, IntegrationScratch& scratch,
+                   FusionRecord& record, const std::function<std::string(const FusionRecord&)>& after_frame) {
   while (std::optional<ReadResult> next = frames.next()) {
     ++record.read;
     if (const auto* skipped = std::get_if<SkippedFrame>(&*next)) {
@@ -39,6 +36,7 @@ FusionRecord fuse_sequence(DecodeAhead& frames, Map& map, const IntegrationConfi
       const FrameStats stats = integrate(map, frame, config, scratch);
       record.labels += stats.labels;
       if (stats.labels.unknown > 0) count_unknown_ids(frame, map.classes, record.unknown_ids);
+      record_frame(map.frames, source.recording, source.settings, frame.index);
       ++record.fused;
       record.allocate_s += stats.allocate_s;
       record.fuse_s += stats.fuse_s;
@@ -47,7 +45,6 @@ FusionRecord fuse_sequence(DecodeAhead& frames, Map& map, const IntegrationConfi
     record.stopped = after_frame(record);
     if (!record.stopped.empty()) break;
   }
-  return record;
 }
 
 }  // namespace felt::apps

@@ -1,4 +1,8 @@
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
 #include <cstdio>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "apps/command.h"
@@ -6,6 +10,7 @@
 #include "apps/exit_code.h"
 #include "core/error.h"
 #include "io/map_file.h"
+#include "io/map_grids.h"
 #include "io/open_sequence.h"
 #include "mapping/crop.h"
 
@@ -22,7 +27,27 @@ Json classes_json(const ClassTable& table) {
   return classes;
 }
 
-Json describe_map(const fs::path& file) {
+/// Per grid what its active voxels hold: how many, and of numbers the least, greatest and mean.
+Json grids_json(const Map& map) {
+  Json grids = Json::object();
+  for (const MapGrid& grid : map_grids(map)) {
+    const openvdb::GridBase::Ptr made = grid.make();
+    Json& entry = grids[grid.name] = {{"active_voxels", made->activeVoxelCount()}};
+    const auto values = openvdb::gridPtrCast<openvdb::FloatGrid>(made);
+    if (values == nullptr || values->tree().leafCount() == 0) continue;
+    double sum = 0, least = std::numeric_limits<double>::infinity(), greatest = -least;
+    for (auto value = values->cbeginValueOn(); value; ++value) {
+      sum += double(*value);
+      least = std::min(least, double(*value));
+      greatest = std::max(greatest, double(*value));
+    }
+    entry["least"] = least, entry["greatest"] = greatest;
+    entry["mean"] = sum / double(std::max<openvdb::Index64>(1, made->activeVoxelCount()));
+  }
+  return grids;
+}
+
+Json describe_map(const fs::path& file, bool with_grids) {
   const Map map = load_map(file);
   const Eigen::AlignedBox3d bounds_m = observed_bounds(map);
   Json json;
@@ -38,7 +63,9 @@ Json describe_map(const fs::path& file) {
   json["bytes"] = {
       {"tsdf", map.store.geometry_bytes()}, {"color", map.store.color_bytes()}, {"classes", class_bytes(map)}};
   json["frames"] = frame_count(map.frames);
+  json["touches"] = map.touches.touches.size();
   json["classes"] = classes_json(map.classes);
+  if (with_grids) json["grids"] = grids_json(map);
   json["map_hash"] = map_hash(map);
   Json metadata = Json::object();
   for (const auto& [key, value] : map.metadata) {
@@ -84,11 +111,11 @@ void print_lines(const Json& json, const std::string& indent) {
   }
 }
 
-int run(const fs::path& path, const SequenceOptions& options, const CommonOptions& common) {
+int run(const fs::path& path, const SequenceOptions& options, bool with_grids, const CommonOptions& common) {
   if (!fs::exists(path))
     throw IoError(describe_mismatch(path.string(), "what to describe", "a map file or a sequence", "nothing there"));
   const bool is_map = fs::is_regular_file(path) && path.extension() == ".vdb";
-  const Json json = is_map ? describe_map(path) : describe_sequence(path, options);
+  const Json json = is_map ? describe_map(path, with_grids) : describe_sequence(path, options);
   if (common.json) {
     std::printf("%s\n", json.dump(2).c_str());
   } else {
@@ -103,13 +130,15 @@ void add_info(CLI::App& app) {
   struct Arguments {
     fs::path path;
     SequenceOptions options;
+    bool grids = false;
     CommonOptions common;
   };
   auto a = std::make_shared<Arguments>();
   CLI::App& command = add_command(
       app, {"info", "Say what a map or a sequence holds", "feltmap info result/map.vdb\nfeltmap info recording --json"},
-      a->common, [a] { return run(a->path, a->options, a->common); });
+      a->common, [a] { return run(a->path, a->options, a->grids, a->common); });
   command.add_option("PATH", a->path, "A map file, or a folder (or .sens file) of a recorded sequence")->required();
+  command.add_flag("--grids", a->grids, "Of a map also every grid: active voxels, least, greatest and mean value");
   command.add_option("--format", a->options.format, "Layout of the sequence, where detection is wrong");
 }
 

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "io/atomic_file.h"
 
 namespace felt::apps {
 namespace fs = std::filesystem;
@@ -19,6 +20,7 @@ void prepare_output_folder(const fs::path& folder, const std::vector<std::string
   if (access(folder.c_str(), W_OK | X_OK) != 0)
     throw IoError(
         describe_mismatch(folder.string(), "output folder", "a folder that can be written", std::strerror(errno)));
+  for (const std::string& name : names) remove_abandoned_parts(folder / name);
   std::string in_the_way;
   for (const std::string& name : names)
     if (fs::exists(folder / name)) in_the_way += (in_the_way.empty() ? "" : ", ") + name;

@@ -1,11 +1,15 @@
+#include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 
 #include <chrono>
 #include <cstdio>
 #include <exception>
+#include <functional>
 #include <future>
 #include <nlohmann/json.hpp>
+#include <utility>
 
+#include "apps/checkpoint.h"
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
@@ -20,7 +24,7 @@
 #include "core/simd.h"
 #include "io/atomic_file.h"
 #include "io/decode_ahead.h"
-#include "io/map_file.h"
+#include "io/doctor.h"
 #include "io/mesh_io.h"
 #include "io/open_sequence.h"
 #include "io/system_memory.h"
@@ -80,28 +84,42 @@ bool memory_runs_out(const Map& map) {
   return double(available_memory_bytes()) < estimated_bytes(double(map.store.size()), resolution) - held + 64e6;
 }
 
-FusionRecord fuse(const SequenceReader& sequence, const PerceptionTimes& perception, Map& map,
-                  const ReconstructOptions& options, const std::vector<uint16_t>& ignored_ids,
-                  const CommonOptions& common, const InterruptGuard& interrupt) {
+/// Saves the map on the way. What cannot be written now may be later: the run goes on, and the last one stays.
+void try_checkpoint(const std::function<void()>& save, int64_t frames) {
+  try {
+    save();
+    spdlog::info("checkpoint after {} frames", frames);
+  } catch (const IoError& fault) {
+    spdlog::warn("no checkpoint: {}", fault.what());
+  }
+}
+
+/// Fuses what the record has not read yet.
+void fuse(const SequenceReader& sequence, const FrameSource& source, const PerceptionTimes& perception,
+          const ReconstructOptions& options, const std::vector<uint16_t>& ignored_ids, const CommonOptions& common,
+          const InterruptGuard& interrupt, const std::function<void()>& save, Map& map, IntegrationScratch& scratch,
+          FusionRecord& record) {
   ProgressBar progress("frames", sequence.size(), !common.quiet);
-  DecodeAhead frames(sequence, {.threads = common.thread_count()});
+  DecodeAhead frames(sequence, {.threads = common.thread_count(), .first = record.read});
   const auto decode_s = [&] { return frames.decode_s() - perception.network_s() - perception.vote_s(); };
-  FusionRecord record =
-      fuse_sequence(frames, map, options.fusion, ignored_ids, [&](const FusionRecord& so_far) -> std::string {
-        progress.update(so_far.read, shares_text({{"network", perception.network_s()},
-                                                  {"vote", perception.vote_s()},
-                                                  {"decode", decode_s()},
-                                                  {"fuse", so_far.allocate_s + so_far.fuse_s}}));
-        if (interrupt.requested()) return "interrupted";
-        constexpr int64_t kMemoryCheckEvery = 32;
-        if (so_far.read % kMemoryCheckEvery == 0 && memory_runs_out(map)) return "out of memory";
-        return {};
-      });
+  fuse_sequence(frames, source, options.fusion, ignored_ids, map, scratch, record,
+                [&](const FusionRecord& so_far) -> std::string {
+                  progress.update(so_far.read, shares_text({{"network", perception.network_s()},
+                                                            {"vote", perception.vote_s()},
+                                                            {"decode", decode_s()},
+                                                            {"fuse", so_far.allocate_s + so_far.fuse_s}}));
+                  if (interrupt.requested()) return "interrupted";
+                  constexpr int64_t kMemoryCheckEvery = 32;
+                  if (so_far.read % kMemoryCheckEvery == 0 && memory_runs_out(map)) return "out of memory";
+                  if (options.checkpoint_every > 0 && so_far.read % options.checkpoint_every == 0 &&
+                      so_far.read < sequence.size())
+                    try_checkpoint(save, so_far.read);
+                  return {};
+                });
   record.network_s = perception.network_s();
   record.vote_s = perception.vote_s();
   record.decode_s = decode_s();
   record.wait_s = frames.wait_s();
-  return record;
 }
 
 /// "3 frames: 2 missing pose, 1 truncated depth image".
@@ -116,10 +134,11 @@ std::string nothing_fused(const FusionRecord& record) {
 }
 
 /// Map file and mesh, side by side. The map is what cannot be made again: a mesh that fails does not stop its saving.
-void write_results(const Map& map, const fs::path& folder, int threads, ReconstructReport& report) {
+void write_results(const Map& map, const std::function<void()>& save, const fs::path& folder, int threads,
+                   ReconstructReport& report) {
   auto saving = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&] {
     const auto start = Clock::now();
-    save_map(map, folder / kMapName);
+    save();
     report.save_s = seconds_since(start);
   });
   std::exception_ptr mesh_failure;
@@ -163,6 +182,18 @@ void print_summary(const ReconstructReport& report, const fs::path& folder) {
   for (const char* name : {kMapName, kMeshName, kReportName}) std::printf("  %s\n", (folder / name).c_str());
 }
 
+/// A few frames projected into each other before the work begins: what is likely wrong is said, and nothing changed.
+void warn_of_faults(const ReconstructOptions& options) {
+  try {
+    for (const Finding& finding : examine_quickly(options.sequence, options.reading).findings)
+      if (finding.faulty)
+        spdlog::warn("{}: {} ({}); try {}, and see feltmap doctor", finding.topic, finding.belief, finding.evidence,
+                     finding.remedy);
+  } catch (const Error&) {
+    // What cannot even be examined is reported where it is read.
+  }
+}
+
 int run(const ReconstructArguments& arguments, CommonOptions common) {
   const auto start = Clock::now();
   ReconstructOptions options = resolve(arguments, common.threads);
@@ -172,31 +203,48 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   const Perception perception = perception_of(options.perception, sequence->info().classes);
   const PreparedClasses classes = prepare_classes(options.labels, perception.classes(sequence->info()));
   const TouchPlan touches = plan_touches(options, *sequence, classes.table);
-  prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite);
+  prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite || options.resume);
   check_memory(*sequence, options);
+  warn_of_faults(options);
   sequence = perceived_sequence(std::move(sequence), perception);
 
+  const nlohmann::ordered_json config = to_json(options);
+  const FrameSource source{sequence->info().fingerprint, fusion_settings(config)};
   ReconstructReport report;
   Map map(options.voxel_size_m, options.truncation_m);
   map.classes = classes.table;
   map.properties = touches.properties;
   options.fusion.labels.likelihood = classes.likelihood.get();
+  IntegrationScratch scratch;
+  bool complete = false;
+  if (options.resume)
+    if (auto earlier = resume(options.out / kMapName, source.recording, config)) {
+      map = std::move(earlier->map);
+      report.fusion = std::move(earlier->record);
+      scratch.viewpoints.set_seen(std::move(earlier->viewpoints));
+      report.resumed_after = report.fusion.read;
+      complete = earlier->complete;
+    }
+  const auto save = [&] {
+    save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, source.recording, config,
+                    options.out / kMapName);
+  };
   const InterruptGuard interrupt;
-  report.fusion = fuse(*sequence, *perception.times, map, options, classes.ignored_ids, common, interrupt);
+  fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save, map, scratch,
+       report.fusion);
   if (report.fusion.fused == 0 && report.fusion.stopped.empty())
     throw FormatError(describe_mismatch(options.sequence.string(), "frames", "at least one that can be fused",
                                         nothing_fused(report.fusion)));
 
   // An interrupted run may go on: its touches come with its last frame.
   std::vector<TouchOutcome> touched;
-  if (report.fusion.stopped.empty()) {
+  if (report.fusion.stopped.empty() && !complete) {
     const auto start_touch = Clock::now();
     touched = apply_touches(map, touches);
     report.touch_s = seconds_since(start_touch);
+    complete = true;
   }
-  const nlohmann::ordered_json config = to_json(options);
-  map.metadata["config"] = config.dump();
-  write_results(map, options.out, common.thread_count(), report);
+  write_results(map, save, options.out, common.thread_count(), report);
   report.voxel_size_m = options.voxel_size_m, report.truncation_m = options.truncation_m;
   report.blocks = map.store.size();
   report.active_voxels = active_voxel_count(map);
@@ -223,8 +271,10 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   print_refused(touches, touched);
   const FusionRecord& fusion = report.fusion;
   if (fusion.stopped.empty()) return kDone;
-  std::fprintf(stderr, "feltmap: %s after %lld of %lld frames: what was fused is saved in %s\n", fusion.stopped.c_str(),
-               static_cast<long long>(fusion.read), static_cast<long long>(sequence->size()), options.out.c_str());
+  std::fprintf(stderr,
+               "feltmap: %s after %lld of %lld frames: what was fused is saved in %s; --resume goes on from there\n",
+               fusion.stopped.c_str(), static_cast<long long>(fusion.read), static_cast<long long>(sequence->size()),
+               options.out.c_str());
   return kInterrupted;
 }
 
@@ -237,7 +287,8 @@ void add_reconstruct(CLI::App& app) {
                                   {"reconstruct", "Fuse a recorded RGB-D sequence into a map, a mesh and a report",
                                    "feltmap reconstruct recording --out result --voxel-size 0.02\n"
                                    "feltmap reconstruct rgbd_dataset_freiburg1_rpy --out result --frames 0:200:2\n"
-                                   "feltmap reconstruct recording --out result --segmenter net.yaml"},
+                                   "feltmap reconstruct recording --out result --segmenter net.yaml\n"
+                                   "feltmap reconstruct recording --out result --checkpoint 100 --resume"},
                                   *common, [arguments, common] { return run(*arguments, *common); });
   add_reconstruct_options(command, *arguments);
 }

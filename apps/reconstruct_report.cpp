@@ -24,6 +24,7 @@ nlohmann::ordered_json to_json(const ReconstructReport& report, const nlohmann::
 
   nlohmann::ordered_json json;
   json["frames"] = {{"read", fusion.read}, {"fused", fusion.fused}, {"skipped", skipped}};
+  if (report.resumed_after > 0) json["frames"]["resumed_after"] = report.resumed_after;
   if (!fusion.stopped.empty()) json["stopped"] = fusion.stopped;
   json["voxel_size_m"] = report.voxel_size_m;
   json["truncation_m"] = report.truncation_m;

@@ -39,6 +39,7 @@ struct ReconstructReport {
   int threads = 1;
   std::string simd;
   std::string map_hash;
+  int64_t resumed_after = 0;  ///< frames that an earlier run had read
   size_t mesh_vertices = 0, mesh_triangles = 0;
 };
 

@@ -37,6 +37,10 @@ private:
   int descriptor_ = -1;
 };
 
+/// Removes what writers that were killed left beside `destination`: temporary files that nobody has open any more. A
+/// file that is being written, by whatever process, stays (writers hold a lock on theirs).
+void remove_abandoned_parts(const std::filesystem::path& destination);
+
 /// Replaces the content of `destination` by `bytes` in one step.
 void write_file_atomically(const std::filesystem::path& destination, std::string_view bytes);
 

@@ -38,13 +38,13 @@ struct DecodeAhead::State {
   std::mutex mutex;
   std::condition_variable frame_ready, slot_free;
   std::vector<Slot> slots;
-  int64_t count, claimed = 0, taken = 0;
+  int64_t count, claimed, taken;
   bool stop = false;
   double decode_s = 0, wait_s = 0;
   std::vector<std::thread> workers;
 
   State(const SequenceReader& r, const DecodeAheadOptions& options)
-      : reader(r), cancel(options.cancel), count(r.size()) {
+      : reader(r), cancel(options.cancel), count(r.size()), claimed(options.first), taken(options.first) {
     const int64_t by_bytes = options.max_bytes / std::max<int64_t>(1, frame_bytes(r.info()));
     const int64_t least = std::max(1, options.threads);
     slots.resize(size_t(std::max(least, std::min(options.max_frames, by_bytes))));

@@ -13,6 +13,7 @@ struct DecodeAheadOptions {
   /// Threads that decode, the consumer's included: n - 1 workers run beside it, and `next` decodes too instead of
   /// waiting. 1: everything happens within `next`.
   int threads = 1;
+  int64_t first = 0;                          ///< position of the first frame
   int64_t max_frames = 16;                    ///< decoded and not yet taken; at least `threads` are allowed
   int64_t max_bytes = int64_t(256) << 20;     ///< of those frames' images, by the size of the sequence's camera
   const std::atomic<bool>* cancel = nullptr;  ///< once true, `next` gives nothing more

@@ -28,7 +28,13 @@ std::string to_json(const MapDifference& difference, const std::string& a, const
       {"blocks",
        {{"only_a", difference.blocks_only_a}, {"only_b", difference.blocks_only_b}, {"both", difference.blocks_both}}},
       {"channels", channels},
-      {"class_flips", difference.class_flips}};
+      {"class_flips", difference.class_flips},
+      {"touches",
+       {{"only_a", difference.touches_only_a},
+        {"only_b", difference.touches_only_b},
+        {"both", difference.touches_both},
+        {"regions_changed", difference.regions_changed},
+        {"region_voxels_changed", difference.region_voxels_changed}}}};
   return report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -48,7 +54,14 @@ std::string to_text(const MapDifference& difference) {
                   c.voxels_only_a, c.voxels_only_b, c.voxels_changed, c.max_difference, c.mean_difference);
     text += line + (c.unit.empty() ? "" : " " + c.unit) + "\n";
   }
-  return text + "class flips: " + std::to_string(difference.class_flips) + "\n";
+  text += "class flips: " + std::to_string(difference.class_flips) + "\n";
+  const size_t touches = difference.touches_only_a + difference.touches_only_b + difference.touches_both;
+  if (touches == 0) return text;
+  std::snprintf(line, sizeof line,
+                "touches: %zu in both, %zu only in A, %zu only in B; %zu regions differ, by %zu voxels\n",
+                difference.touches_both, difference.touches_only_a, difference.touches_only_b,
+                difference.regions_changed, difference.region_voxels_changed);
+  return text + line;
 }
 
 }  // namespace felt

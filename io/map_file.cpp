@@ -3,137 +3,150 @@
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <functional>
-#include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
-#include "io/atomic_file.h"
+#include "io/map_grids.h"
 #include "io/map_metadata.h"
 #include "io/map_trailer.h"
-#include "io/vdb_writer.h"
+#include "io/opened_file.h"
+#include "io/vdb_file.h"
+#include "io/vdb_reader.h"
 #include "mapping/touch_update.h"
-#include "mapping/vdb_classes.h"
 #include "mapping/vdb_state.h"
 #include "mapping/vdb_touch.h"
-#include "mapping/vdb_views.h"
 
 namespace felt {
 namespace fs = std::filesystem;
 namespace {
 
-uint32_t vdb_flags(MapCompression compression) {
-  switch (compression) {
-    case MapCompression::none:
-      break;
-    case MapCompression::blosc:
-      return openvdb::io::COMPRESS_ACTIVE_MASK | openvdb::io::COMPRESS_BLOSC;
-    case MapCompression::zip:
-      return openvdb::io::COMPRESS_ACTIVE_MASK | openvdb::io::COMPRESS_ZIP;
+[[noreturn]] void fail_leaf(const std::string& where, const std::string& grid, const BlockCoord& coord,
+                            const std::string& expected, const std::string& found) {
+  const Index3 first = first_voxel(coord);
+  throw FormatError(describe_mismatch(
+      where + ": grid '" + grid + "'",
+      "leaf at (" + std::to_string(first.x) + ", " + std::to_string(first.y) + ", " + std::to_string(first.z) + ")",
+      expected, found));
+}
+
+Block& block_of_leaf(Map& map, const BlockCoord& coord, const std::string& grid, const std::string& where) {
+  const uint32_t number = map.store.find(coord);
+  if (number == BlockStore::kNone) fail_leaf(where, grid, coord, "a leaf of 'tsdf' there", "none");
+  return map.store[number];
+}
+
+uint16_t u16_of(int32_t value, const std::string& where, const std::string& grid, const BlockCoord& coord) {
+  if (value < 0 || value > 0xffff) fail_leaf(where, grid, coord, "0 to 65535", std::to_string(value));
+  return uint16_t(value);
+}
+
+void require_leaves(size_t found, size_t expected, const std::string& grid, const std::string& where) {
+  if (found != expected)
+    throw FormatError(describe_mismatch(where + ": grid '" + grid + "'", "leaves",
+                                        std::to_string(expected) + ", one for each that belongs to it",
+                                        std::to_string(found)));
+}
+
+void load_geometry(const VdbReader& file, const std::string& where, Map& map) {
+  file.read<float>("tsdf", [&](const VdbLeaf<float>& leaf) {
+    std::copy_n(leaf.values, kBlockVoxels, map.store[map.store.find_or_create(leaf.coord)].geometry->tsdf);
+  });
+  size_t leaves = 0;
+  file.read<float>("weight", [&](const VdbLeaf<float>& leaf) {
+    std::copy_n(leaf.values, kBlockVoxels, block_of_leaf(map, leaf.coord, "weight", where).geometry->weight);
+    ++leaves;
+  });
+  require_leaves(leaves, map.store.size(), "weight", where);
+}
+
+/// The exact inverse of color_grid's scale: a 16-bit value survives the trip through float.
+uint16_t stored_color(float value) {
+  return value > 0 ? uint16_t(int32_t(std::min(value * (255.0f * 256), 65535.0f) + 0.5f)) : uint16_t(0);
+}
+
+void load_color(const VdbReader& file, const std::string& where, Map& map) {
+  size_t colored = 0, leaves = 0;
+  file.read<int32_t>("color_count", [&](const VdbLeaf<int32_t>& leaf) {
+    ColorPlanes& planes = map.store.add_color(block_of_leaf(map, leaf.coord, "color_count", where));
+    for (int i = 0; i < kBlockVoxels; ++i) planes.count[i] = u16_of(leaf.values[i], where, "color_count", leaf.coord);
+    ++colored;
+  });
+  file.read<openvdb::Vec3s>("color", [&](const VdbLeaf<openvdb::Vec3s>& leaf) {
+    // Blocks without colour have a leaf here too: the grid's topology is that of `tsdf`.
+    ColorPlanes* planes = block_of_leaf(map, leaf.coord, "color", where).color;
+    if (planes == nullptr) return;
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      const openvdb::Vec3s& rgb = leaf.values[i];
+      planes->r[i] = stored_color(rgb.x());
+      planes->g[i] = stored_color(rgb.y());
+      planes->b[i] = stored_color(rgb.z());
+    }
+    ++leaves;
+  });
+  require_leaves(leaves, colored, "color", where);
+}
+
+/// Classes in ascending order of slot.
+void load_evidence(const VdbReader& file, const std::string& where, Map& map) {
+  for (int slot = 0; slot < map.classes.size(); ++slot) {
+    const std::string name = evidence_name(map, slot);
+    if (!file.has(name)) continue;
+    file.read<float>(name, [&](const VdbLeaf<float>& leaf) {
+      Block& block = block_of_leaf(map, leaf.coord, name, where);
+      Plane* plane = map.store.new_plane();
+      std::copy_n(leaf.values, kBlockVoxels, plane->value);
+      block.evidence.push_back({uint16_t(slot), plane});
+    });
   }
-  return openvdb::io::COMPRESS_ACTIVE_MASK;
 }
 
-/// Which classes have a plane anywhere, by slot.
-std::vector<int> observed_classes(const Map& map) {
-  std::vector<bool> seen(size_t(map.classes.size()), false);
-  for (const Block& block : map.store.blocks())
-    if (block.geometry->observed())
-      for (const EvidencePlane& plane : block.evidence) seen[plane.slot] = true;
-  std::vector<int> slots;
-  for (int slot = 0; slot < map.classes.size(); ++slot)
-    if (seen[size_t(slot)]) slots.push_back(slot);
-  return slots;
+void load_even_evidence(const VdbReader& file, const std::string& where, Map& map) {
+  file.read<float>("evidence_even", [&](const VdbLeaf<float>& leaf) {
+    Block& block = block_of_leaf(map, leaf.coord, "evidence_even", where);
+    block.even_evidence = map.store.new_plane();
+    std::copy_n(leaf.values, kBlockVoxels, block.even_evidence->value);
+  });
 }
 
-bool has_color(const Map& map) {
-  for (const Block& block : map.store.blocks())
-    if (block.color != nullptr) return true;
-  return false;
+void load_instances(const VdbReader& file, const std::string& where, Map& map) {
+  size_t instances = 0, leaves = 0;
+  const auto load = [&](const char* name, uint16_t(InstancePlanes::*plane)[kBlockVoxels], size_t& count) {
+    file.read<int32_t>(name, [&](const VdbLeaf<int32_t>& leaf) {
+      Block& block = block_of_leaf(map, leaf.coord, name, where);
+      if (&count == &leaves && block.instance == nullptr)
+        fail_leaf(where, name, leaf.coord, "a leaf of 'instance' there", "none");
+      InstancePlanes& planes = map.store.add_instance(block);
+      for (int i = 0; i < kBlockVoxels; ++i) (planes.*plane)[i] = u16_of(leaf.values[i], where, name, leaf.coord);
+      ++count;
+    });
+  };
+  load("instance", &InstancePlanes::id, instances);
+  load("instance_votes", &InstancePlanes::votes, leaves);
+  require_leaves(leaves, instances, "instance_votes", where);
 }
 
-std::string region_name(const Touch& touch) { return "touch_region/" + id_text(touch.id); }
-
-using MakeGrid = std::function<openvdb::GridBase::Ptr()>;
-
-/// Beliefs of maps with classes, and what of class state only few maps have.
-void add_class_grids(const Map& map, const TouchViews& touched, std::vector<MakeGrid>& grids) {
-  const auto any = [&](auto has) { return std::any_of(map.store.blocks().begin(), map.store.blocks().end(), has); };
-  if (any([](const Block& b) { return b.geometry->observed() && b.even_evidence != nullptr; }))
-    grids.push_back([&] { return even_evidence_grid(map); });
-  if (any([](const Block& b) { return b.geometry->observed() && b.instance != nullptr; })) {
-    grids.push_back([&] { return instance_grid(map); });
-    grids.push_back([&] { return instance_votes_grid(map); });
-  }
-  if (map.classes.size() == 0) return;
-  grids.push_back([&map, touched] { return label_grid(map, *touched); });
-  grids.push_back([&map, touched] { return label_probability_grid(map, *touched); });
-  grids.push_back([&map, touched] { return entropy_grid(map, *touched); });
-  grids.push_back([&map] { return total_evidence_grid(map); });
-}
-
-/// One call for each grid of the file: made when it is written and gone afterwards, so that the file's size does not
-/// decide about memory.
-std::vector<MakeGrid> grids_of(const Map& map) {
-  std::vector<MakeGrid> grids;
-  grids.push_back([&] { return tsdf_grid(map); });
-  grids.push_back([&] { return weight_grid(map); });
-  if (has_color(map)) {
-    grids.push_back([&] { return color_grid(map); });
-    grids.push_back([&] { return color_count_grid(map); });
-  }
-  for (const int slot : observed_classes(map)) grids.push_back([&map, slot] { return evidence_grid(map, slot); });
-  const auto touched = std::make_shared<const std::vector<TouchView>>(touch_views(map));
-  add_class_grids(map, touched, grids);
-  for (const Touch& touch : map.touches.touches)
-    grids.push_back([&map, &touch] { return region_grid(map, touch.region, region_name(touch)); });
-  for (NamedGrid& grid : touch_grids(map, touched)) grids.push_back(std::move(grid.make));
-  return grids;
-}
-
-template <typename Grid>
-typename Grid::Ptr read_grid(openvdb::io::File& file, const std::string& name, const std::string& where) {
-  if (!file.hasGrid(name)) throw FormatError(describe_mismatch(where, "grids", "one named '" + name + "'", "none"));
-  const openvdb::GridBase::Ptr grid = file.readGrid(name);
-  auto typed = openvdb::gridPtrCast<Grid>(grid);
-  if (typed == nullptr)
-    throw FormatError(describe_mismatch(where, "grid '" + name + "'", "type " + Grid::gridType(), grid->type()));
-  return typed;
-}
-
-Map read_map(const fs::path& path) {
+Map read_map(const fs::path& path, uint64_t bytes) {
   const std::string where = path.string();
-  openvdb::io::File file(where);
-  file.setCopyMaxBytes(0);
-  file.open(/*delayLoad=*/false);
-  const MapHeader header = read_metadata(*file.getMetadata(), where);
+  const OpenedFile opened(path);
+  const VdbReader file(opened, bytes, where);
+  MapHeader header = read_metadata(file.metadata(), where);
   Map map(header.voxel_size_m, header.truncation_m);
-  map.classes = header.classes;
-  map.frames = header.frames;
-  map.metadata = header.metadata;
-  add_geometry(map, *read_grid<openvdb::FloatGrid>(file, "tsdf", where),
-               *read_grid<openvdb::FloatGrid>(file, "weight", where));
-  if (file.hasGrid("color_count"))
-    add_color(map, *read_grid<openvdb::Vec3SGrid>(file, "color", where),
-              *read_grid<openvdb::Int32Grid>(file, "color_count", where));
-  for (int slot = 0; slot < map.classes.size(); ++slot)
-    if (const std::string name = "evidence/" + map.classes.at_slot(slot).name; file.hasGrid(name))
-      add_evidence(map, slot, *read_grid<openvdb::FloatGrid>(file, name, where));
-  if (file.hasGrid("evidence_even"))
-    add_even_evidence(map, *read_grid<openvdb::FloatGrid>(file, "evidence_even", where));
-  if (file.hasGrid("instance"))
-    add_instances(map, *read_grid<openvdb::Int32Grid>(file, "instance", where),
-                  *read_grid<openvdb::Int32Grid>(file, "instance_votes", where));
-  map.properties = header.properties;
-  map.touches = header.touches;
+  map.classes = std::move(header.classes);
+  map.frames = std::move(header.frames);
+  map.metadata = std::move(header.metadata);
+  load_geometry(file, where, map);
+  if (file.has("color_count")) load_color(file, where, map);
+  load_evidence(file, where, map);
+  if (file.has("evidence_even")) load_even_evidence(file, where, map);
+  if (file.has("instance")) load_instances(file, where, map);
+  map.properties = std::move(header.properties);
+  map.touches = std::move(header.touches);
   for (Touch& touch : map.touches.touches) {
     if (!map.properties.index_of(touch.request.property))
       throw FormatError(describe_mismatch(where, "touch " + id_text(touch.id), "a property of the map's table",
                                           "'" + touch.request.property + "'"));
-    touch.region = region_of(*read_grid<openvdb::MaskGrid>(file, region_name(touch), where));
+    touch.region = file.read_mask(touch_region_name(touch));
   }
   rebuild_touch_planes(map);
   if (const std::string hash = map_hash(map); hash != header.hash)
@@ -145,35 +158,14 @@ Map read_map(const fs::path& path) {
 
 void save_map(const Map& map, const fs::path& path, const SaveOptions& options) {
   openvdb::initialize();
-  AtomicFile file(path);
-  const auto failed = [&] { return IoError(path.string() + ": cannot write: " + std::strerror(errno)); };
-  std::vector<char> buffer(1 << 20);
-  std::ofstream os;
-  os.rdbuf()->pubsetbuf(buffer.data(), std::streamsize(buffer.size()));
-  os.open(file.path(), std::ios::binary | std::ios::in | std::ios::out);
-  const auto grids = grids_of(map);
+  const std::vector<MapGrid> grids = options.views ? map_grids(map) : state_grids(map);
   const std::string hash = map_hash(map);
-  VdbWriter writer(os, to_metadata(map, hash), int32_t(grids.size()), vdb_flags(options.compression), hash);
-  for (const auto& make : grids) {
-    writer.write(*make());
-    // A full disk shows here, not after the remaining grids.
-    if (!os.good()) throw failed();
-  }
-  if (!os.flush()) throw failed();
-  os << make_map_trailer(file.path(), kMapFileVersion);
-  os.close();
-  if (!os) throw failed();
-  file.commit();
+  VdbFile file(path, to_metadata(map, hash), grids.size(), hash);
+  for (const MapGrid& grid : grids) file.write(*grid.make(), options.compression, grid.noisy);
+  file.flush();
+  file.commit(make_map_trailer(file.written(), kMapFileVersion));
 }
 
-Map load_map(const fs::path& path) {
-  openvdb::initialize();
-  verify_map_trailer(path, kMapFileVersion);
-  try {
-    return read_map(path);
-  } catch (const openvdb::Exception& error) {
-    throw FormatError(path.string() + ": OpenVDB cannot read it: " + error.what());
-  }
-}
+Map load_map(const fs::path& path) { return read_map(path, verify_map_trailer(path, kMapFileVersion)); }
 
 }  // namespace felt

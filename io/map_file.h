@@ -14,13 +14,15 @@ inline constexpr uint32_t kMapFileVersion = 1;
 
 /// How leaf values are stored. All are exact; every stock reader built with the library named reads them.
 enum class MapCompression {
+  fast,   ///< blosc for counts; distances, weights and colours as they are: noise that blosc hardly shortens
   none,   ///< values of active voxels as they are
   blosc,  ///< LZ4 with byte shuffling
   zip     ///< DEFLATE: small and slow
 };
 
 struct SaveOptions {
-  MapCompression compression = MapCompression::blosc;
+  MapCompression compression = MapCompression::fast;
+  bool views = true;  ///< also what stock viewers show and loading does not need: labels, entropy, property estimates
 };
 
 /// Writes the map so that `path` holds either what it held before or the whole new map, also through a crash or a full

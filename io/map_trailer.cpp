@@ -1,19 +1,16 @@
 #include "io/map_trailer.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cstring>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "core/error.h"
+#include "io/opened_file.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -24,49 +21,6 @@ static_assert(std::endian::native == std::endian::little, "OpenVDB writes native
 constexpr char kMagic[] = "feltmap trailer\n";  // 16 characters
 constexpr size_t kDigestBytes = sizeof(XXH128_canonical_t), kHeadBytes = kMapTrailerBytes - kDigestBytes;
 static_assert(sizeof kMagic - 1 == 16);
-
-/// An open file whose size and bytes are read with plain system calls, so that a file that shrinks meanwhile is an
-/// error and not a signal, as it would be with a mapping.
-class OpenedFile {
-public:
-  explicit OpenedFile(const fs::path& path) : path_(path), descriptor_(open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
-    if (descriptor_ < 0) fail("open");
-    struct stat status {};
-    if (fstat(descriptor_, &status) != 0) fail("read the size");
-    if (!S_ISREG(status.st_mode)) {
-      close(descriptor_);
-      throw IoError(describe_mismatch(path.string(), "input", "a regular file",
-                                      S_ISDIR(status.st_mode) ? "a folder" : "a special file"));
-    }
-    size_ = uint64_t(status.st_size);
-  }
-  ~OpenedFile() { close(descriptor_); }
-  OpenedFile(const OpenedFile&) = delete;
-  OpenedFile& operator=(const OpenedFile&) = delete;
-
-  uint64_t size() const { return size_; }
-
-  void read(void* to, size_t bytes, uint64_t offset) const {
-    auto* out = static_cast<char*>(to);
-    while (bytes > 0) {
-      const ssize_t n = pread(descriptor_, out, bytes, off_t(offset));
-      if (n < 0 && errno == EINTR) continue;
-      if (n < 0) fail("read");
-      if (n == 0) throw IoError(path_.string() + ": cannot read: the file became shorter meanwhile");
-      out += n;
-      offset += uint64_t(n);
-      bytes -= size_t(n);
-    }
-  }
-
-private:
-  [[noreturn]] void fail(const char* step) const {
-    throw IoError(path_.string() + ": cannot " + step + ": " + std::strerror(errno));
-  }
-  fs::path path_;
-  int descriptor_;
-  uint64_t size_ = 0;
-};
 
 /// Digest of the first `bytes` of the file followed by `tail`.
 XXH128_canonical_t digest(const OpenedFile& file, uint64_t bytes, const char* tail, size_t tail_bytes) {

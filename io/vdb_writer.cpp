@@ -22,10 +22,8 @@ std::string identifier(const std::string& seed) {
 
 }  // namespace
 
-VdbWriter::VdbWriter(std::ostream& os, const openvdb::MetaMap& metadata, int32_t grids, uint32_t compression,
-                     const std::string& seed)
+VdbWriter::VdbWriter(std::ostream& os, const openvdb::MetaMap& metadata, int32_t grids, const std::string& seed)
     : os_(os) {
-  setCompression(compression);
   stream_metadata_->setSeekable(true);
   openvdb::io::setStreamMetadataPtr(os_, stream_metadata_, /*transfer=*/false);
   writeHeader(os_, /*seekable=*/true);
@@ -39,7 +37,8 @@ VdbWriter::VdbWriter(std::ostream& os, const openvdb::MetaMap& metadata, int32_t
 
 VdbWriter::~VdbWriter() { openvdb::io::clearStreamMetadataPtr(os_); }
 
-void VdbWriter::write(openvdb::GridBase& grid) {
+void VdbWriter::write(openvdb::GridBase& grid, uint32_t compression) {
+  setCompression(compression);
   openvdb::io::GridDescriptor descriptor(grid.getName(), grid.type(), grid.saveFloatAsHalf());
   descriptor.writeHeader(os_);
   const std::streampos offsets = os_.tellp();

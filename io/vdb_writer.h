@@ -14,17 +14,16 @@ namespace felt {
 /// identifier that OpenVDB puts into a file's header is replaced by one that follows from `seed`.
 class VdbWriter : private openvdb::io::Archive {
 public:
-  /// `os` is seekable and at its beginning. `compression` is a combination of openvdb::io's flags; `grids` is the
-  /// number of `write` calls that follow.
-  VdbWriter(std::ostream& os, const openvdb::MetaMap& metadata, int32_t grids, uint32_t compression,
-            const std::string& seed);
+  /// `os` is seekable and at its beginning. `grids` is the number of `write` calls that follow.
+  VdbWriter(std::ostream& os, const openvdb::MetaMap& metadata, int32_t grids, const std::string& seed);
   ~VdbWriter() override;
   VdbWriter(const VdbWriter&) = delete;
   VdbWriter& operator=(const VdbWriter&) = delete;
 
-  /// Grid names must be distinct. Float grids with `saveFloatAsHalf` are stored in 16 bits. Adds the usual statistics
-  /// (file_bbox_min, file_voxel_count, ...) to the grid's metadata.
-  void write(openvdb::GridBase& grid);
+  /// `compression` is a combination of openvdb::io's flags. Grid names must be distinct. Float grids with
+  /// `saveFloatAsHalf` are stored in 16 bits. Adds the usual statistics (file_bbox_min, file_voxel_count, ...) to the
+  /// grid's metadata.
+  void write(openvdb::GridBase& grid, uint32_t compression);
 
 private:
   std::ostream& os_;

@@ -89,6 +89,11 @@ struct Channels {
     Accumulator sums;
   };
   std::vector<Evidence> evidence;
+  struct Touched {
+    std::optional<int> property_a, property_b;
+    Accumulator n, mean, m2;
+  };
+  std::vector<Touched> touched;
 };
 
 Channels make_channels(const Map& a, const Map& b) {
@@ -99,6 +104,18 @@ Channels make_channels(const Map& a, const Map& b) {
   for (const std::string& name : names)
     channels.evidence.push_back(
         {a.classes.slot_of_name(name), b.classes.slot_of_name(name), {"evidence/" + name, "counts"}});
+  std::set<std::string> properties;
+  for (const Map* map : {&a, &b})
+    if (map->touches.any_active())
+      for (int p = 0; p < map->properties.size(); ++p) properties.insert(map->properties[p].name);
+  for (const std::string& name : properties) {
+    const std::string prefix = "touch/" + name + "/";
+    channels.touched.push_back({a.properties.index_of(name),
+                                b.properties.index_of(name),
+                                {prefix + "n", "readings"},
+                                {prefix + "mean", "unit"},
+                                {prefix + "m2", "unit^2"}});
+  }
   return channels;
 }
 
@@ -148,6 +165,45 @@ void compare_instances(const Block* a, const Block* b, Accumulator& channel) {
   }
 }
 
+const TouchPlanes* touch_planes_of(const Block* block, std::optional<int> property) {
+  if (block == nullptr || !property) return nullptr;
+  for (const TouchPlanes& planes : block->touch)
+    if (planes.property == *property) return &planes;
+  return nullptr;
+}
+
+void compare_touched(const Block* a, const Block* b, Channels::Touched& channel) {
+  const TouchPlanes* ta = touch_planes_of(a, channel.property_a);
+  const TouchPlanes* tb = touch_planes_of(b, channel.property_b);
+  if (ta == nullptr && tb == nullptr) return;
+  const auto compare = [&](Plane* const TouchPlanes::*plane, Accumulator& sums) {
+    for (int i = 0; i < kBlockVoxels; ++i)
+      sums.add(ta != nullptr && ta->n->value[i] > 0, tb != nullptr && tb->n->value[i] > 0,
+               ta != nullptr ? (ta->*plane)->value[i] : 0, tb != nullptr ? (tb->*plane)->value[i] : 0);
+  };
+  compare(&TouchPlanes::n, channel.n);
+  compare(&TouchPlanes::mean, channel.mean);
+  compare(&TouchPlanes::m2, channel.m2);
+}
+
+void compare_journals(const TouchJournal& a, const TouchJournal& b, MapDifference& result) {
+  const auto active = [](const Touch* touch) { return touch != nullptr && !touch->undone; };
+  for (const Touch& touch : b.touches) result.touches_only_b += active(&touch) && !active(a.find(touch.id));
+  for (const Touch& touch : a.touches) {
+    if (!active(&touch)) continue;
+    const Touch* other = b.find(touch.id);
+    if (!active(other)) {
+      ++result.touches_only_a;
+      continue;
+    }
+    ++result.touches_both;
+    if (touch.region == other->region) continue;
+    ++result.regions_changed;
+    result.region_voxels_changed +=
+        subtracted(touch.region, other->region).voxels() + subtracted(other->region, touch.region).voxels();
+  }
+}
+
 size_t flips(const Map& map_a, const Map& map_b, const Block* a, const Block* b) {
   if (a == nullptr || b == nullptr || a->evidence.empty() || b->evidence.empty()) return 0;
   size_t n = 0;
@@ -181,6 +237,7 @@ MapDifference difference(const Map& a, const Map& b) {
     compare_planes(in_a != nullptr ? in_a->even_evidence : nullptr, in_b != nullptr ? in_b->even_evidence : nullptr,
                    channels.even_evidence);
     compare_instances(in_a, in_b, channels.instance);
+    for (Channels::Touched& channel : channels.touched) compare_touched(in_a, in_b, channel);
     result.class_flips += flips(a, b, in_a, in_b);
   }
   for (Accumulator* sums : {&channels.tsdf, &channels.weight, &channels.color, &channels.color_count})
@@ -191,6 +248,9 @@ MapDifference difference(const Map& a, const Map& b) {
     if (const ChannelDifference channel = sums->finish();
         channel.voxels_both + channel.voxels_only_a + channel.voxels_only_b > 0)
       result.channels.push_back(channel);
+  for (Channels::Touched& channel : channels.touched)
+    for (Accumulator* sums : {&channel.n, &channel.mean, &channel.m2}) result.channels.push_back(sums->finish());
+  compare_journals(a.touches, b.touches, result);
   return result;
 }
 
@@ -198,6 +258,7 @@ bool beyond(const MapDifference& difference, double tolerance) {
   if (!difference.comparable) return true;
   for (const std::string& line : difference.settings)
     if (!line.starts_with("frame journals")) return true;
+  if (difference.touches_only_a + difference.touches_only_b + difference.regions_changed > 0) return true;
   return std::any_of(difference.channels.begin(), difference.channels.end(), [&](const ChannelDifference& c) {
     return c.voxels_only_a != 0 || c.voxels_only_b != 0 || !(c.max_difference <= tolerance);
   });

@@ -9,7 +9,8 @@
 namespace felt {
 
 /// How one channel of two maps differs. A voxel has a value in `tsdf` and `weight` where it was observed, in `color`
-/// and `color_count` where it was coloured, in `evidence/<class>` where the class has evidence above its prior.
+/// and `color_count` where it was coloured, in `evidence/<class>` where the class has evidence above its prior, in
+/// `touch/<property>/{n,mean,m2}` where touches reached it.
 struct ChannelDifference {
   std::string name;
   std::string unit;          ///< of the two differences: "m", "", "grey levels" (of 255), "observations", "counts"
@@ -29,13 +30,18 @@ struct MapDifference {
   std::vector<ChannelDifference> channels;
   /// Voxels with evidence in both maps whose class of greatest evidence (the first of equals) has another name.
   size_t class_flips = 0;
+  /// Active touches, by id.
+  size_t touches_only_a = 0, touches_only_b = 0, touches_both = 0;
+  size_t regions_changed = 0;        ///< touches of both maps whose regions are not the same voxels
+  size_t region_voxels_changed = 0;  ///< voxels that are in one of such two regions only
 };
 
 /// Compares two maps channel by channel. Blocks that hold nothing do not count.
 MapDifference difference(const Map& a, const Map& b);
 
 /// Whether the maps differ by more than rounding allows: other voxels have values, or a value differs by more than
-/// `tolerance` in its own unit, or the voxel size, truncation or classes are others. Journals may differ.
+/// `tolerance` in its own unit, or the voxel size, truncation, classes or touches are others. Frame journals may
+/// differ.
 bool beyond(const MapDifference& difference, double tolerance);
 
 }  // namespace felt

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <string>
+
+#include "mapping/touch_state.h"
 
 namespace felt {
 namespace {
@@ -81,6 +84,61 @@ void verify_evidence(const Map& map, const Block& block, Faults& faults) {
   if (block.even_evidence != nullptr) verify_counts(*block.even_evidence, "evidence_even", block, faults);
 }
 
+void verify_touch_planes(const Map& map, const Block& block, Faults& faults) {
+  for (const TouchPlanes& planes : block.touch) {
+    if (planes.property >= map.properties.size()) {
+      faults.add("touch", "every plane has a property in the table", block.coord, 0);
+      continue;
+    }
+    const std::string prefix = "touch/" + map.properties[planes.property].name + "/";
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      const float n = planes.n->value[i], mean = planes.mean->value[i], m2 = planes.m2->value[i];
+      if (!std::isfinite(n) || n < 0) faults.add(prefix + "n", "number of readings is finite and >= 0", block.coord, i);
+      if (!std::isfinite(mean)) faults.add(prefix + "mean", "mean is finite", block.coord, i);
+      if (!std::isfinite(m2) || m2 < 0)
+        faults.add(prefix + "m2", "squared deviation is finite and >= 0", block.coord, i);
+    }
+  }
+}
+
+void verify_regions(const Map& map, Faults& faults) {
+  for (const Touch& touch : map.touches.touches) {
+    const std::string grid = "touch_region/" + id_text(touch.id);
+    if (touch.region.empty())
+      faults.add(grid, "a touch has a region", block_of_voxel(touch.voxel), offset_in_block(touch.voxel));
+    for (size_t b = 0; b < touch.region.blocks(); ++b) {
+      const BlockCoord& coord = touch.region.coord[b];
+      const Block* block = map.store.get(coord);
+      for_each_bit(touch.region.mask[b], [&](int i) {
+        if (block == nullptr || !(block->geometry->weight[i] > 0))
+          faults.add(grid, "a region holds observed voxels only", coord, i);
+      });
+    }
+  }
+}
+
+/// What the journal and the counts say of touched voxels must be a belief: alpha, kappa, beta, gamma > 0.
+void verify_beliefs(const Map& map, Faults& faults) {
+  const auto positive = [](double x) { return std::isfinite(x) && x > 0; };
+  Beliefs beliefs(map);
+  for (const TouchGroup& group : touch_groups(map))
+    for (size_t b = 0; b < group.region.blocks(); ++b)
+      for_each_bit(group.region.mask[b], [&](int i) {
+        const BlockCoord& coord = group.region.coord[b];
+        const Index3 first = first_voxel(coord), in = voxel_of_offset(i);
+        const Belief belief = beliefs.at({first.x + in.x, first.y + in.y, first.z + in.z});
+        for (const double alpha : belief.concentration)
+          if (!positive(alpha)) faults.add("alpha", "alpha is finite and > 0", coord, i);
+        for (size_t p = 0; p < belief.nig.size(); ++p)
+          for (const Nig& nig : belief.nig[p]) {
+            const std::string grid = "property/" + map.properties[int(p)].name;
+            if (nig.kappa == 0) continue;  // a class without a prior
+            if (!positive(nig.kappa) || !positive(nig.beta) || !positive(nig.gamma) || !std::isfinite(nig.tau))
+              faults.add(grid, "tau is finite, and kappa, beta and gamma are finite and > 0", coord, i);
+          }
+      });
+}
+
 }  // namespace
 
 std::vector<MapFault> verify(const Map& map) {
@@ -91,7 +149,10 @@ std::vector<MapFault> verify(const Map& map) {
     verify_color(block, faults);
     verify_evidence(map, block, faults);
     verify_instances(block, faults);
+    verify_touch_planes(map, block, faults);
   }
+  verify_regions(map, faults);
+  if (map.touches.any_active()) verify_beliefs(map, faults);
   return faults.take();
 }
 

@@ -17,7 +17,8 @@ struct MapFault {
 
 /// Checks every invariant of a map in memory: numbers finite, weight >= 0, |tsdf| <= truncation and at the background
 /// where nothing was observed, evidence >= 0 and its planes one for each class in ascending order, colour only where
-/// it was observed. Empty where the map is sound.
+/// it was observed; touched voxels observed, their statistics finite, and what follows for them a belief (alpha, kappa,
+/// beta and gamma finite and > 0). Empty where the map is sound.
 std::vector<MapFault> verify(const Map& map);
 
 }  // namespace felt

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <queue>
 
@@ -227,21 +228,28 @@ bool map_has_labels(const Map& map) {
                      [](const Block& b) { return !b.evidence.empty(); });
 }
 
-/// Strongest class of the surface band within two voxels of the contact, -1 where there is no evidence.
-int contact_class(const Map& map, const Index3& centre, const SurfaceRule& band) {
-  std::vector<double> sum(size_t(std::max(1, map.classes.size())), 0.0);
+/// Calls `visit(block, offset)` for the voxels of the surface band within two voxels of the contact.
+template <typename Visit>
+void for_each_near(const Map& map, const Index3& centre, const SurfaceRule& band, const Visit& visit) {
   for (int dx = -2; dx <= 2; ++dx)
     for (int dy = -2; dy <= 2; ++dy)
       for (int dz = -2; dz <= 2; ++dz) {
         const Index3 v{centre.x + dx, centre.y + dy, centre.z + dz};
         const Block* block = map.store.get(block_of_voxel(v));
         const int i = offset_in_block(v);
-        if (block == nullptr || block->geometry->weight[i] < band.min_weight ||
-            std::abs(block->geometry->tsdf[i]) > band.band_m)
-          continue;
-        for (const EvidencePlane& e : block->evidence)
-          if (e.slot < sum.size()) sum[e.slot] += e.counts->value[i];
+        if (block != nullptr && block->geometry->weight[i] >= band.min_weight &&
+            std::abs(block->geometry->tsdf[i]) <= band.band_m)
+          visit(*block, i);
       }
+}
+
+/// Strongest class there, -1 where there is no evidence.
+int contact_class(const Map& map, const Index3& centre, const SurfaceRule& band) {
+  std::vector<double> sum(size_t(std::max(1, map.classes.size())), 0.0);
+  for_each_near(map, centre, band, [&](const Block& block, int i) {
+    for (const EvidencePlane& e : block.evidence)
+      if (e.slot < sum.size()) sum[e.slot] += e.counts->value[i];
+  });
   const auto best = std::max_element(sum.begin(), sum.end());
   return *best > 0 ? int(best - sum.begin()) : -1;
 }

@@ -120,6 +120,12 @@ BlockMask where(const Keep& keep) {
   return mask;
 }
 
+BlockMask belongs_to(const Block& block, uint16_t instance) {
+  if (block.instance == nullptr) return {};
+  const InstancePlanes& planes = *block.instance;
+  return where([&](int i) { return (planes.id[i] == instance) & (planes.votes[i] > 0); });
+}
+
 BlockMask agrees_with_class(const Block& block, const SurfaceRule& rule) {
   float own[kBlockVoxels] = {}, best[kBlockVoxels] = {}, total[kBlockVoxels] = {};
   for (const EvidencePlane& e : block.evidence) {
@@ -164,6 +170,7 @@ BlockMask surface_band(const Block& block, float band_m, float min_weight) {
 BlockMask candidates(const Block& block, const SurfaceRule& rule) {
   BlockMask mask = surface_band(block, rule.band_m, rule.min_weight);
   if (!mask.any()) return mask;
+  if (rule.instance != 0) mask &= belongs_to(block, rule.instance);
   if (rule.slot >= 0) mask &= agrees_with_class(block, rule);
   if (rule.limit_color) mask &= agrees_with_color(block, rule);
   if (std::isfinite(rule.radius_voxels)) mask &= within_radius(block, rule);

@@ -13,6 +13,7 @@ namespace felt {
 struct SurfaceRule {
   float band_m = 0;
   float min_weight = 1;
+  uint16_t instance = 0;     ///< thing to belong to; 0: things do not matter
   int slot = -1;             ///< class to agree with; -1: classes do not matter
   float class_ratio = 0;     ///< see RegionSettings
   bool limit_color = false;  ///< whether `color` and `color_change` count

@@ -16,6 +16,7 @@ using Eigen::Vector3f;
 
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 constexpr double kBeyondWall = 1e-4;  ///< voxels past a wall, so that rounding cannot hold a ray in front of it
+constexpr double kGraze = 1e-6;       ///< voxels of distance that count as zero at a cell's wall
 constexpr double kFinest = 1e-3;      ///< voxels: where the refinement stops
 
 /// A ray in voxel coordinates, t in voxels.
@@ -84,10 +85,15 @@ double cross_cell(MapSampler& sampler, const Ray& ray, const Index3& base, doubl
     const Vector3d p = origin + at * ray.direction;
     return trilinear(d, p.x(), p.y(), p.z());
   };
+  // A surface that lies in the wall between two cells is zero for both up to rounding: it must not slip through.
   const double d_in = distance(t);
-  if (!(d_in > 0)) return kNothing;
+  if (!(d_in > -kGraze)) return kNothing;
   const double d_out = distance(t_end);
-  if (d_out <= 0) return refine(t, d_in, t_end, d_out, distance);
+  if (d_out <= kGraze && d_out < d_in) {
+    if (d_in <= 0) return t;
+    return d_out > 0 ? t_end : refine(t, d_in, t_end, d_out, distance);
+  }
+  if (!(d_in > 0)) return kNothing;
   // The distance along the ray is a cubic: it can dip below zero inside.
   const double t_middle = 0.5 * (t + t_end), d_middle = distance(t_middle);
   return d_middle <= 0 ? refine(t, d_in, t_middle, d_middle, distance) : kNothing;

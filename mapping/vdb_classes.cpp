@@ -6,7 +6,6 @@
 #include <cmath>
 #include <memory>
 
-#include "core/error.h"
 #include "mapping/class_belief.h"
 #include "mapping/leaf_mask.h"
 
@@ -83,31 +82,6 @@ typename Grid::Ptr plane_grid(const Map& map, const char* name, Values values_of
   return grid->tree().leafCount() == 0 ? nullptr : grid;
 }
 
-[[noreturn]] void fail(const openvdb::GridBase& grid, const std::string& what, const std::string& expected,
-                       const std::string& found) {
-  throw FormatError(describe_mismatch("grid '" + grid.getName() + "'", what, expected, found));
-}
-
-/// The block under each leaf. Throws where a value lies outside the leaves or a leaf outside the blocks.
-template <typename Grid, typename Visit>
-void for_each_leaf(Map& map, const Grid& grid, Visit visit) {
-  if (grid.tree().activeTileCount() != 0) fail(grid, "values", "leaves only", "active tiles");
-  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
-    const openvdb::Coord origin = leaf->origin();
-    const uint32_t number = map.store.find(block_of_voxel({origin.x(), origin.y(), origin.z()}));
-    if (number == BlockStore::kNone)
-      fail(grid, "leaf", "a leaf of 'tsdf' there",
-           "none at (" + std::to_string(origin.x()) + ", " + std::to_string(origin.y()) + ", " +
-               std::to_string(origin.z()) + ")");
-    visit(map.store[number], leaf->buffer().data());
-  }
-}
-
-uint16_t id_of(const openvdb::GridBase& grid, int32_t value) {
-  if (value < 0 || value > 0xffff) fail(grid, "value", "0 to 65535", std::to_string(value));
-  return uint16_t(value);
-}
-
 }  // namespace
 
 openvdb::Int32Grid::Ptr label_grid(const Map& map, std::span<const TouchView> touched) {
@@ -161,27 +135,6 @@ openvdb::Int32Grid::Ptr instance_grid(const Map& map) {
 openvdb::Int32Grid::Ptr instance_votes_grid(const Map& map) {
   return plane_grid<openvdb::Int32Grid>(map, "instance_votes", [](const Block& block) -> const uint16_t* {
     return block.instance == nullptr ? nullptr : block.instance->votes;
-  });
-}
-
-void add_even_evidence(Map& map, const openvdb::FloatGrid& even) {
-  for_each_leaf(map, even, [&](Block& block, const float* values) {
-    block.even_evidence = map.store.new_plane();
-    std::copy_n(values, kBlockVoxels, block.even_evidence->value);
-  });
-}
-
-void add_instances(Map& map, const openvdb::Int32Grid& instance, const openvdb::Int32Grid& votes) {
-  if (instance.tree().leafCount() != votes.tree().leafCount())
-    fail(votes, "leaves", std::to_string(instance.tree().leafCount()) + " as in 'instance'",
-         std::to_string(votes.tree().leafCount()));
-  for_each_leaf(map, instance, [&](Block& block, const int32_t* values) {
-    InstancePlanes& planes = map.store.add_instance(block);
-    for (int i = 0; i < kBlockVoxels; ++i) planes.id[i] = id_of(instance, values[i]);
-  });
-  for_each_leaf(map, votes, [&](Block& block, const int32_t* values) {
-    InstancePlanes& planes = map.store.add_instance(block);
-    for (int i = 0; i < kBlockVoxels; ++i) planes.votes[i] = id_of(votes, values[i]);
   });
 }
 

@@ -27,8 +27,4 @@ openvdb::FloatGrid::Ptr even_evidence_grid(const Map& map);
 openvdb::Int32Grid::Ptr instance_grid(const Map& map);
 openvdb::Int32Grid::Ptr instance_votes_grid(const Map& map);
 
-/// Add what the state grids hold; every leaf must lie on a block of the map. Throw FormatError.
-void add_even_evidence(Map& map, const openvdb::FloatGrid& even);
-void add_instances(Map& map, const openvdb::Int32Grid& instance, const openvdb::Int32Grid& votes);
-
 }  // namespace felt

@@ -73,6 +73,8 @@ openvdb::FloatGrid::Ptr property_grid(const Map& map, const PropertyView& view, 
 
 }  // namespace
 
+std::string touch_region_name(const Touch& touch) { return "touch_region/" + id_text(touch.id); }
+
 openvdb::MaskGrid::Ptr region_grid(const Map& map, const Region& region, const std::string& name) {
   auto grid = new_grid<openvdb::MaskGrid>(map, name);
   for (size_t b = 0; b < region.blocks(); ++b) {

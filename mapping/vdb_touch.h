@@ -11,6 +11,9 @@
 
 namespace felt {
 
+/// "touch_region/<id>": the grid that holds the region of a touch.
+std::string touch_region_name(const Touch& touch);
+
 /// A region as a stock mask grid, and back.
 openvdb::MaskGrid::Ptr region_grid(const Map& map, const Region& region, const std::string& name);
 Region region_of(const openvdb::MaskGrid& grid);

@@ -16,13 +16,14 @@ typename Grid::Ptr make_grid(const Map& map, const char* name, typename Grid::Va
   auto grid = Grid::create(background);
   grid->setName(name);
   grid->setTransform(openvdb::math::Transform::createLinearTransform(map.voxel_size_m));
+  using Leaf = typename Grid::TreeType::LeafNodeType;
+  openvdb::tree::ValueAccessor<typename Grid::TreeType> accessor(grid->tree());
   for (const Block& block : map.store.blocks()) {
     if (!block.geometry->observed()) continue;
-    using Leaf = typename Grid::TreeType::LeafNodeType;
-    auto leaf = std::make_unique<Leaf>(first_coord(block.coord), background);
+    auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), first_coord(block.coord));
     write(block, leaf->buffer().data());
     set_active(*leaf, [&](int i) { return block.geometry->weight[i] > 0; });
-    grid->tree().addLeaf(leaf.release());
+    accessor.addLeaf(leaf.release());
   }
   return grid;
 }
@@ -45,7 +46,10 @@ openvdb::FloatGrid::Ptr weight_grid(const Map& map) {
 openvdb::Vec3SGrid::Ptr color_grid(const Map& map) {
   auto grid =
       make_grid<openvdb::Vec3SGrid>(map, "color", openvdb::Vec3s(0.0f), [](const Block& b, openvdb::Vec3s* out) {
-        if (b.color == nullptr) return;
+        if (b.color == nullptr) {
+          std::fill_n(out, kBlockVoxels, openvdb::Vec3s(0.0f));
+          return;
+        }
         constexpr float kScale = 1.0f / (255 * 256);
         for (int i = 0; i < kBlockVoxels; ++i)
           out[i] = openvdb::Vec3s(b.color->r[i] * kScale, b.color->g[i] * kScale, b.color->b[i] * kScale);

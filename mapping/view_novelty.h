@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <utility>
 #include <vector>
 
 namespace felt {
@@ -12,6 +13,9 @@ class ViewNovelty {
 public:
   /// Novelty of a view, which is then one of the earlier ones.
   double add(const Eigen::Isometry3d& T_world_camera, double full_m, double full_deg);
+  /// Earlier views, which a run that goes on begins with.
+  const std::vector<Eigen::Isometry3d>& seen() const { return seen_; }
+  void set_seen(std::vector<Eigen::Isometry3d> views) { seen_ = std::move(views); }
 
 private:
   std::vector<Eigen::Isometry3d> seen_;

@@ -9,15 +9,6 @@
 #include "mapping/class_belief.h"
 
 namespace felt {
-namespace {
-
-void vision_concentration(const Map& map, const VoxelRef& voxel, std::span<double> alpha) {
-  std::fill(alpha.begin(), alpha.end(), 1.0);
-  for (const EvidencePlane& plane : map.store[voxel.block].evidence)
-    alpha[plane.slot] += double(plane.counts->value[voxel.offset]);
-}
-
-}  // namespace
 
 VoxelBeliefs::VoxelBeliefs(const Map& map) : map_(map), touched_block_(map.store.size(), kUntouched) {
   Beliefs beliefs(map);
@@ -62,7 +53,7 @@ VoxelBeliefs::VoxelBeliefs(const Map& map) : map_(map), touched_block_(map.store
     states_.resize(first + voxels.size());
     tbb::parallel_for(size_t(0), voxels.size(), [&](size_t i) {
       std::vector<double> alpha(size_t(map_.classes.size()));
-      vision_concentration(map_, voxels[i], alpha);
+      class_concentration(&map_.store[voxels[i].block], voxels[i].offset, map_.classes, alpha);
       Belief belief = beliefs.assemble(std::move(alpha), material, group.touches);
       states_[first + i] = {std::move(belief.class_probability), std::move(belief.next_reading)};
     });
@@ -81,7 +72,7 @@ void VoxelBeliefs::class_probability(const VoxelRef& voxel, std::span<double> p)
     std::copy(state->class_probability.begin(), state->class_probability.end(), p.begin());
     return;
   }
-  vision_concentration(map_, voxel, p);
+  class_concentration(&map_.store[voxel.block], voxel.offset, map_.classes, p);
   double total = 0;
   for (const double a : p) total += a;
   for (double& a : p) a /= total;
@@ -89,7 +80,7 @@ void VoxelBeliefs::class_probability(const VoxelRef& voxel, std::span<double> p)
 
 int VoxelBeliefs::strongest_class(const VoxelRef& voxel) const {
   if (const State* state = state_of(voxel)) return most_probable_class(state->class_probability);
-  const ClassBelief belief = class_belief(map_.store[voxel.block], voxel.offset, map_.classes.size());
+  const ClassBelief belief = class_belief(map_.store[voxel.block], voxel.offset, map_.classes);
   return belief.slot == ClassTable::kNoSlot ? -1 : int(belief.slot);
 }
 

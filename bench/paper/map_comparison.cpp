@@ -91,6 +91,12 @@ bool touched(Map& map, const Recording& recording, const Reading& reading, doubl
 
 }  // namespace
 
+ClassTable with_prior(const ClassTable& classes, double prior) {
+  std::vector<ClassInfo> rows = classes.classes();
+  for (ClassInfo& row : rows) row.prior = prior;
+  return ClassTable(std::move(rows));
+}
+
 NetworkLabels network_labels(const Recording& recording, const ConfusionMatrix& confusion, uint64_t seed) {
   std::vector<double> share(size_t(recording.classes.size()), 1e-6);
   for (const Frame& frame : recording.frames)
@@ -111,16 +117,11 @@ NetworkLabels network_labels(const Recording& recording, const ConfusionMatrix& 
 
 Map fused(const Recording& recording, const NetworkLabels& network, Evidence evidence) {
   Map map(recording.voxel_size_m, 4 * recording.voxel_size_m);
-  map.classes = recording.classes;
+  map.classes = evidence == Evidence::calibrated ? with_prior(recording.classes, 1.0 / recording.classes.size())
+                                                 : recording.classes;
   map.properties = PropertyTable({recording.property});
   IntegrationConfig config;
   config.max_depth_m = float(recording.max_depth_m);
-  if (evidence == Evidence::calibrated) {
-    // The frames repeat one judgement, whose probabilities are to stand as they are: each weighs ten times the prior's
-    // one count a class, and a cap keeps many of them from looking like certainty.
-    config.labels.evidence = float(10 * recording.classes.size());
-    config.labels.max_evidence = float(100 * recording.classes.size());
-  }
   IntegrationScratch scratch;
   for (size_t i = 0; i < recording.frames.size(); ++i) {
     Frame frame = recording.frames[i];

@@ -22,10 +22,15 @@ struct Recording {
   double max_depth_m = 4;
 };
 
+/// The same classes with this concentration each before anything was seen.
+ClassTable with_prior(const ClassTable& classes, double prior);
+
 /// How a map takes the network's labels.
 enum class Evidence {
-  counts,      ///< one count a pixel for its label: what semantic mappers do
-  calibrated,  ///< P(true class | label) from the network's confusion and the classes' shares, one draw for all frames
+  counts,  ///< one count a pixel for its label: what semantic mappers do
+  /// P(true class | label) from the network's confusion and the classes' shares, on a prior of one count for all
+  /// classes together: the frames repeat one judgement, and its probabilities are to stand.
+  calibrated,
 };
 
 /// A network that is wrong about whole things in all frames, with this confusion.

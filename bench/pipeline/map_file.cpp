@@ -1,6 +1,6 @@
 // Save and load of the map file against OpenVDB's own stream on the same grids, with one thread, in a folder that is in
 // memory. Rates are bytes of planes in memory (what the map holds) per second of the whole call.
-//   bench_map_file none|blosc|zip [blocks along a side of the wall] [folder]
+//   bench_map_file fast|none|blosc|zip [blocks along a side of the wall] [folder]
 //   bench_map_file grids                   memory with 1,000 grids
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
@@ -17,8 +17,7 @@
 #include <functional>
 
 #include "io/map_file.h"
-#include "mapping/vdb_state.h"
-#include "mapping/vdb_views.h"
+#include "io/map_grids.h"
 
 namespace {
 
@@ -84,7 +83,9 @@ void require_same(const Map& a, const Map& b) {
 }
 
 uint32_t stock_flags(MapCompression compression) {
-  if (compression == MapCompression::blosc) return openvdb::io::COMPRESS_ACTIVE_MASK | openvdb::io::COMPRESS_BLOSC;
+  // OpenVDB compresses with Blosc unless told otherwise.
+  if (compression == MapCompression::blosc || compression == MapCompression::fast)
+    return openvdb::io::COMPRESS_ACTIVE_MASK | openvdb::io::COMPRESS_BLOSC;
   if (compression == MapCompression::zip) return openvdb::io::COMPRESS_ACTIVE_MASK | openvdb::io::COMPRESS_ZIP;
   return openvdb::io::COMPRESS_ACTIVE_MASK;
 }
@@ -96,9 +97,8 @@ void measure(const Map& map, MapCompression compression, const char* name, const
   const double load_s = median_of_five_s([&] { (void)load_map(path); });
   require_same(load_map(path), map);
   // OpenVDB alone: the same grids, made beforehand.
-  openvdb::GridPtrVec grids{tsdf_grid(map), weight_grid(map), color_grid(map), color_count_grid(map)};
-  for (int slot = 0; slot < map.classes.size(); ++slot)
-    if (auto grid = evidence_grid(map, slot)) grids.push_back(grid);
+  openvdb::GridPtrVec grids;
+  for (const MapGrid& grid : map_grids(map)) grids.push_back(grid.make());
   const double write_s = median_of_five_s([&] {
     std::ofstream os(stock, std::ios::binary);
     openvdb::io::Stream stream(os);
@@ -137,16 +137,17 @@ void measure_memory(const fs::path& folder) {
 int main(int argc, char** argv) {
   openvdb::initialize();
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
-  const std::string what = argc > 1 ? argv[1] : "blosc";
+  const std::string what = argc > 1 ? argv[1] : "fast";
   const int side = argc > 2 ? std::stoi(argv[2]) : 120;
   const fs::path folder = fs::path(argc > 3 ? argv[3] : "/dev/shm") / ("feltmap-bench-" + std::to_string(getpid()));
   fs::create_directories(folder);
   if (what == "grids") {
     measure_memory(folder);
   } else {
-    const MapCompression compression = what == "none"  ? MapCompression::none
-                                       : what == "zip" ? MapCompression::zip
-                                                       : MapCompression::blosc;
+    const MapCompression compression = what == "none"    ? MapCompression::none
+                                       : what == "zip"   ? MapCompression::zip
+                                       : what == "blosc" ? MapCompression::blosc
+                                                         : MapCompression::fast;
     measure(wall(side, 20), compression, what.c_str(), folder);
   }
   fs::remove_all(folder);

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "tests/cli/command.h"
+#include "tests/cli/sequences.h"
 #include "tests/support/data.h"
 
 namespace felt::test {
@@ -16,25 +17,10 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-std::string quoted(const fs::path& path) { return "'" + path.string() + "'"; }
-
 std::string file_text(const fs::path& file) {
   std::ostringstream text;
   text << std::ifstream(file, std::ios::binary).rdbuf();
   return text.str();
-}
-
-/// Twelve small views of boxes on a floor, made once.
-const fs::path& boxes() {
-  static const TemporaryDirectory directory;
-  static const fs::path sequence = directory.path() / "boxes";
-  if (!fs::exists(sequence)) {
-    const CommandResult made = run_feltmap("simulate boxes --out " + quoted(sequence) +
-                                           " --frames 12 --width 160 --height 120 --no-mesh --quiet");
-    INFO(made.err);
-    REQUIRE(made.exit_code == 0);
-  }
-  return sequence;
 }
 
 CommandResult reconstruct(const fs::path& sequence, const fs::path& out, const std::string& options = "") {
@@ -45,30 +31,6 @@ CommandResult reconstruct(const fs::path& sequence, const fs::path& out, const s
 fs::path stock_vdb_reader() { return command().parent_path().parent_path() / "tests" / "stock_vdb_reader"; }
 
 size_t line_count(const std::string& text) { return size_t(std::count(text.begin(), text.end(), '\n')); }
-
-/// A copy of `boxes` that takes seconds: the same twelve frames many times over, as links.
-fs::path long_sequence(const fs::path& folder) {
-  constexpr int kRounds = 600;
-  fs::create_directories(folder);
-  fs::copy(boxes() / "sequence.yaml", folder / "sequence.yaml");
-  for (const char* channel : {"color", "depth"}) {
-    fs::create_directory(folder / channel);
-    for (const auto& image : fs::directory_iterator(boxes() / channel)) {
-      const int number = std::stoi(image.path().stem().string());
-      for (int round = 0; round < kRounds; ++round)
-        fs::create_symlink(
-            image.path(), folder / channel / (std::to_string(number + 12 * round) + image.path().extension().string()));
-    }
-  }
-  std::ifstream recorded(boxes() / "poses.txt");
-  std::vector<std::string> poses;
-  for (std::string line; std::getline(recorded, line);)
-    if (!line.empty() && line[0] != '#') poses.push_back(line.substr(line.find(' ')));
-  REQUIRE(poses.size() == 12);
-  std::ofstream all(folder / "poses.txt");
-  for (int i = 0; i < 12 * kRounds; ++i) all << i << poses[size_t(i % 12)] << '\n';
-  return folder;
-}
 
 }  // namespace
 
@@ -228,7 +190,7 @@ TEST_CASE("a full disk exits with 4 and leaves the earlier result as it was") {
 
 TEST_CASE("a signal saves what is fused, says so and exits with 5") {
   const TemporaryDirectory folder;
-  const fs::path sequence = long_sequence(folder.path() / "long"), out = folder.path() / "out";
+  const fs::path sequence = boxes_repeated(folder.path() / "long", 600), out = folder.path() / "out";
   for (const char* signal : {"INT", "TERM"}) {
     INFO(signal);
     fs::remove_all(out);

@@ -122,6 +122,7 @@ TEST_CASE("what cannot be touched is refused with one line and leaves the file a
   refused("--at 0.2,0,0 --property friction --value 0.3 --sigma=-1", 4, "sigma");
   refused("--at 0.2,0,0 --property friction --value 0.3 --stamp nan", 4, "stamp");
   refused("--at 0.2,0,0 --property friction --value 0.3 --rho 1", 4, "rho");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --region instance", 4, "--instances");
   refused("--at 0.2,0,0 --property friction --value 0.3 --model magic", 2, "magic");
   refused("--at 0.2,0,0 --property friction --value 0.3 --region mask", 4, "--intrinsics");
 

@@ -214,3 +214,53 @@ TEST_CASE("regions of the stored scenes end at creases and where the material ch
     CHECK(flat >= 2);
   }
 }
+TEST_CASE("a touch of a thing by its instance reaches all of that thing and nothing else") {
+  const std::filesystem::path folder = source_dir() / "data/scenes/table_wall";
+  const Scene scene = read_scene(folder / "scene.json");
+  SequenceOptions reading;
+  reading.read_color = false;
+  reading.read_instances = true;
+  const auto sequence = open_sequence(folder, reading);
+  Map map(0.03, 0.12);
+  map.classes = sequence->info().classes;
+  IntegrationConfig config;
+  config.labels.instances = true;
+  IntegrationScratch scratch;
+  for (int64_t i = 0; i < sequence->size(); ++i) integrate(map, std::get<Frame>(sequence->read(i)), config, scratch);
+
+  const Primitive* table_top = nullptr;
+  for (const Primitive& p : scene.primitives)
+    if (p.shape == ShapeKind::box && p.half_size_m.x() > 0.5 && p.half_size_m.z() < 0.1) table_top = &p;
+  REQUIRE(table_top != nullptr);
+  RegionSettings settings;
+  settings.rule = RegionRule::instance;
+  const Eigen::Vector3d on_top = table_top->T_world_shape * Eigen::Vector3d(-0.4, 0, table_top->half_size_m.z());
+  const Region region = find_region(map, find_contact(map, on_top, settings), settings);
+  settings.rule = RegionRule::connected;
+  const Region top = find_region(map, find_contact(map, on_top, settings), settings);
+  CHECK(intersected(top, region).voxels() > 0.9 * double(top.voxels()));
+
+  size_t other = 0;
+  for (size_t b = 0; b < region.blocks(); ++b)
+    for_each_bit(region.mask[b], [&](int i) {
+      const Index3 f = first_voxel(region.coord[b]), o = voxel_of_offset(i);
+      const Eigen::Vector3d p = Eigen::Vector3d(f.x + o.x, f.y + o.y, f.z + o.z) * map.voxel_size_m;
+      double distance_m = 1e9;
+      for (const Primitive& primitive : scene.primitives)
+        if (primitive.instance == table_top->instance)
+          distance_m = std::min(distance_m, std::abs(signed_distance_m(primitive, p)));
+      other += distance_m > 2 * map.voxel_size_m;
+    });
+  INFO(region.voxels() << " voxels");
+  CHECK(other == 0);
+
+  Map without(0.03, 0.12);
+  without.classes = map.classes;
+  fuse(without, std::get<Frame>(sequence->read(0)), 0);
+  fuse(without, std::get<Frame>(sequence->read(1)), 0);
+  settings.rule = RegionRule::instance;
+  const Block& seen = without.store[without.store.sorted()[without.store.size() / 2]];
+  REQUIRE(seen.instance == nullptr);
+  CHECK_THROWS_WITH(find_region(without, find_contact(without, on_top, settings), settings),
+                    Catch::Contains("--instances"));
+}

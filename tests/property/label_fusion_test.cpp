@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <map>
 
 #include <tbb/global_control.h>
@@ -246,23 +248,20 @@ TEST_CASE("probabilities are exact: their evidence equals a dictionary's, and no
         }
         if (named.empty()) return;
         double rest = sum < 1 - 3 / 65535.0 ? 1 - sum : 0;
-        for (bool again = true; again && int(named.size()) < k;) {
-          again = false;
-          for (const auto& [slot, p] : named)
-            if (p < rest / (k - int(named.size()))) {
-              rest += p;
-              named.erase(slot);
-              again = true;
-              break;
-            }
+        while (int(named.size()) < k) {  // the least is one of the others where it is below their share
+          const auto least = std::min_element(named.begin(), named.end(),
+                                              [](const auto& a, const auto& b) { return a.second < b.second; });
+          if (least == named.end() || least->second >= rest / (k - int(named.size()))) break;
+          rest += least->second;
+          named.erase(least);
         }
         std::vector<double>& alpha = dictionary[voxel];
         alpha.resize(size_t(k), 0.0);
         for (int slot = 0; slot < k; ++slot) {
           const auto at = named.find(slot);
-          const double add = at != named.end()       ? at->second
-                             : int(named.size()) < k ? rest / (k - int(named.size()))
-                                                     : 0;
+          const bool all_named = int(named.size()) == k;
+          const double share = rest / (all_named ? k : k - int(named.size()));
+          const double add = at == named.end() ? share : at->second + (all_named ? share : 0);
           alpha[size_t(slot)] += add;
           mass += add;
         }

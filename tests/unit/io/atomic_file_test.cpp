@@ -108,3 +108,28 @@ TEST_CASE("a write that does not fit is an error, and the older file survives it
   CHECK(content(target) == "old");
   CHECK(entries(folder.path()) == 1);
 }
+
+TEST_CASE("what a killed writer left is removed, what is being written and other files stay") {
+  const test::TemporaryDirectory folder;
+  const fs::path target = folder.path() / "map.vdb";
+  std::ofstream(folder.path() / "map.part-99-0.vdb") << "half";
+  std::ofstream(folder.path() / "map.part-99-0.ply") << "another destination's";
+  std::ofstream(folder.path() / "other.part-99-0.vdb") << "another destination's";
+  AtomicFile file(target);
+  file.write("whole");
+  remove_abandoned_parts(target);
+  CHECK_FALSE(fs::exists(folder.path() / "map.part-99-0.vdb"));
+  CHECK(entries(folder.path()) == 3);
+  file.commit();
+  CHECK(content(target) == "whole");
+}
+
+TEST_CASE("a folder that vanishes before the file is whole is an error, not a file somewhere else") {
+  const test::TemporaryDirectory folder;
+  fs::create_directory(folder.path() / "a");
+  AtomicFile file(folder.path() / "a" / "map.vdb");
+  file.write("content");
+  fs::remove_all(folder.path() / "a");
+  CHECK_THROWS_WITH(file.commit(), Catch::Matchers::Contains("No such file or directory"));
+  CHECK(fs::is_empty(folder.path()));
+}

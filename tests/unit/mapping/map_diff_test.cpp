@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "mapping/touch_update.h"
+#include "tests/support/labelled_map.h"
 #include "tests/support/random_map.h"
 
 using namespace felt;
@@ -109,4 +111,44 @@ TEST_CASE("maps with equal values and other journals are equal, and the journals
   CHECK(d.same_hash);
   CHECK(d.settings.size() == 1);
   CHECK_FALSE(beyond(d, 0));
+}
+
+TEST_CASE("touches that only one map has, and regions that differ, are beyond every tolerance") {
+  const auto wall = [] {
+    Map map = test::labelled_map(
+        0.02, {-0.2, -0.2, -0.1}, {0.2, 0.2, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
+        test::class_table({"wood", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 2; });
+    Property friction;
+    friction.name = "friction";
+    friction.priors = {{"wood", {0.4, 0.05, 50}}, {"ice", {0.1, 0.05, 50}}};
+    map.properties = PropertyTable({friction});
+    return map;
+  };
+  const auto request = [](double x) {
+    TouchRequest r;
+    r.point_m = {x, 0, 0};
+    r.property = "friction";
+    r.value = 0.3;
+    return r;
+  };
+  const Map untouched = wall();
+  Map a = wall(), b = wall();
+  add_touch(a, resolve_touch(a, request(-0.1)));
+  MapDifference d = difference(untouched, a);
+  CHECK(d.touches_only_b == 1);
+  CHECK(channel(d, "touch/friction/n").voxels_only_b > 100);
+  CHECK(beyond(d, 1e9));
+  CHECK_FALSE(beyond(difference(a, a), 0));
+  CHECK(difference(a, a).touches_both == 1);
+
+  Touch smaller = resolve_touch(b, request(-0.1));
+  const size_t voxels = smaller.region.voxels();
+  smaller.region.mask[0] = {};
+  smaller.region.mask[0].set(offset_in_block(smaller.voxel));
+  add_touch(b, smaller);
+  d = difference(a, b);
+  CHECK(d.touches_both == 1);
+  CHECK(d.regions_changed == 1);
+  CHECK(d.region_voxels_changed >= voxels - smaller.region.voxels());
+  CHECK(beyond(d, 1e9));
 }

@@ -4,6 +4,8 @@
 #include <functional>
 #include <limits>
 
+#include "mapping/touch_update.h"
+#include "tests/support/labelled_map.h"
 #include "tests/support/random_map.h"
 
 using namespace felt;
@@ -59,4 +61,40 @@ TEST_CASE("each broken invariant is named with its grid, its count and the voxel
     CHECK(faults[0].voxels == 1);
     CHECK(block_of_voxel(faults[0].first) == block.coord);
   }
+}
+
+TEST_CASE("a touched map is sound, and each way to break its touches is named") {
+  const auto touched = [] {
+    Map map = test::labelled_map(
+        0.02, {-0.2, -0.2, -0.1}, {0.2, 0.2, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
+        test::class_table({"wood", "ice"}), [](const Eigen::Vector3d&) { return 1; });
+    Property friction;
+    friction.name = "friction";
+    friction.priors = {{"wood", {0.4, 0.05, 50}}, {"ice", {0.1, 0.05, 50}}};
+    map.properties = PropertyTable({friction});
+    TouchRequest request;
+    request.property = "friction";
+    request.value = 0.3;
+    add_touch(map, resolve_touch(map, request));
+    return map;
+  };
+  CHECK(verify(touched()).empty());
+  const auto broken = [](const Map& map, const std::string& grid) {
+    for (const MapFault& fault : verify(map))
+      if (fault.grid == grid) return fault.voxels > 0;
+    return false;
+  };
+  Map map = touched();
+  map.touches.touches[0].region.append({1000, 0, 0}, map.touches.touches[0].region.mask[0]);
+  CHECK(broken(map, "touch_region/" + id_text(map.touches.touches[0].id)));
+  map = touched();
+  map.touches.touches[0].region = {};
+  CHECK(broken(map, "touch_region/" + id_text(map.touches.touches[0].id)));
+  map = touched();
+  const Block* with_touch = nullptr;
+  for (const Block& block : map.store.blocks())
+    if (!block.touch.empty()) with_touch = &block;
+  REQUIRE(with_touch != nullptr);
+  with_touch->touch[0].m2->value[3] = -1;
+  CHECK(broken(map, "touch/friction/m2"));
 }

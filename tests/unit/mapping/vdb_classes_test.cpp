@@ -55,23 +55,3 @@ TEST_CASE("where a touch reached, the grids show the belief after it") {
   CHECK(label_probability_grid(map, touched)->tree().getValue(at) == 0.875f);
   CHECK(entropy_grid(map, touched)->tree().getValue(at) == 0.125f);
 }
-
-TEST_CASE("shared evidence and instances survive as grids, and grids that do not fit the map are refused") {
-  Map map = test::random_map({.seed = 7, .blocks = 9, .classes = 3, .shared_evidence = true, .instances = true});
-  Map other = test::random_map({.seed = 7, .blocks = 9, .classes = 3});
-  const auto even = even_evidence_grid(map);
-  const auto instance = instance_grid(map), votes = instance_votes_grid(map);
-  REQUIRE(even != nullptr);
-  REQUIRE(instance != nullptr);
-  CHECK(even_evidence_grid(other) == nullptr);
-  CHECK(instance_grid(other) == nullptr);
-  CHECK(map_hash(map) != map_hash(other));
-  add_even_evidence(other, *even);
-  add_instances(other, *instance, *votes);
-  CHECK(map_hash(map) == map_hash(other));
-
-  instance->tree().setValueOn(instance->tree().cbeginLeaf()->origin(), 70000);
-  CHECK_THROWS_AS(add_instances(other, *instance, *votes), FormatError);
-  even->tree().setValueOn({4000, 0, 0}, 1);
-  CHECK_THROWS_AS(add_even_evidence(other, *even), FormatError);
-}

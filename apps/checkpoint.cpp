@@ -1,0 +1,128 @@
+#include "apps/checkpoint.h"
+
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+#include "core/error.h"
+#include "io/map_file.h"
+
+namespace felt::apps {
+namespace {
+
+using nlohmann::json;
+
+// Keys of Map::metadata.
+constexpr const char* kConfig = "config";
+constexpr const char* kProgress = "progress";
+
+/// Twelve numbers a pose, row by row: JSON keeps every bit of them.
+json poses_json(const std::vector<Eigen::Isometry3d>& poses) {
+  json rows = json::array();
+  for (const Eigen::Isometry3d& pose : poses) {
+    json row = json::array();
+    for (int i = 0; i < 12; ++i) row.push_back(pose.matrix()(i / 4, i % 4));
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+std::vector<Eigen::Isometry3d> poses_of(const json& rows) {
+  std::vector<Eigen::Isometry3d> poses;
+  for (const json& row : rows) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    for (int i = 0; i < 12; ++i) pose.matrix()(i / 4, i % 4) = row.at(size_t(i)).get<double>();
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+json progress_of(const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints, bool complete,
+                 const std::string& recording) {
+  json unknown = json::array();
+  for (const auto& [id, pixels] : record.unknown_ids) unknown.push_back({id, pixels});
+  return {{"recording", recording},
+          {"complete", complete},
+          {"read", record.read},
+          {"fused", record.fused},
+          {"skipped", record.skipped},
+          {"label_voxels", {record.labels.voxels, record.labels.unknown, record.labels.invalid}},
+          {"unknown_ids", unknown},
+          {"ignored_pixels", record.ignored_pixels},
+          {"viewpoints", poses_json(viewpoints)}};
+}
+
+json text_of(const Map& map, const char* key, const std::string& where) {
+  const auto found = map.metadata.find(key);
+  const json text = found == map.metadata.end() ? json() : json::parse(found->second, nullptr, false);
+  if (!text.is_object())
+    throw FormatError(
+        describe_mismatch(where, std::string("text '") + key + "'", "that of a map of reconstruct",
+                          found == map.metadata.end() ? "none: not a map that can be continued" : "something else"));
+  return text;
+}
+
+void read_progress(const json& progress, const std::string& where, Checkpoint& checkpoint) {
+  try {
+    FusionRecord& record = checkpoint.record;
+    progress.at("read").get_to(record.read);
+    progress.at("fused").get_to(record.fused);
+    progress.at("skipped").get_to(record.skipped);
+    const json& labels = progress.at("label_voxels");
+    record.labels = {labels.at(0).get<uint64_t>(), labels.at(1).get<uint64_t>(), labels.at(2).get<uint64_t>()};
+    for (const json& row : progress.at("unknown_ids"))
+      record.unknown_ids[row.at(0).get<uint16_t>()] = row.at(1).get<uint64_t>();
+    progress.at("ignored_pixels").get_to(record.ignored_pixels);
+    checkpoint.viewpoints = poses_of(progress.at("viewpoints"));
+    progress.at("complete").get_to(checkpoint.complete);
+  } catch (const json::exception& fault) {
+    throw FormatError(describe_mismatch(where, "text 'progress'", "what reconstruct counts", fault.what()));
+  }
+}
+
+/// The path of a recording may be spelled in another way: its fingerprint is compared instead.
+void require_same_run(const json& then, const json& now, const std::string& where) {
+  std::set<std::string> keys;
+  for (const json* config : {&then, &now})
+    for (const auto& [key, value] : config->items()) keys.insert(key);
+  keys.erase("sequence");
+  std::vector<std::string> problems;
+  for (const std::string& key : keys)
+    if (const json was = then.value(key, json()), is = now.value(key, json()); was != is)
+      problems.push_back(describe_mismatch("--resume", key, was.dump() + " as in " + where, is.dump()));
+  if (!problems.empty()) throw ConfigError(problems);
+}
+
+}  // namespace
+
+std::string fusion_settings(const nlohmann::ordered_json& config) {
+  nlohmann::ordered_json shaping = config;
+  for (const char* key : {"sequence", "frames", "labels", "probs", "classes", "properties", "touches"})
+    shaping.erase(key);
+  return shaping.dump();
+}
+
+void save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
+                     bool complete, const std::string& recording, const nlohmann::ordered_json& config,
+                     const std::filesystem::path& path) {
+  map.metadata[kConfig] = config.dump();
+  map.metadata[kProgress] = progress_of(record, viewpoints, complete, recording).dump();
+  // On the way nobody looks at views, and they take longer than the rest.
+  save_map(map, path, {.views = complete || !record.stopped.empty()});
+}
+
+std::optional<Checkpoint> resume(const std::filesystem::path& path, const std::string& recording,
+                                 const nlohmann::ordered_json& config) {
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  Map map = load_map(path);
+  const std::string where = path.string();
+  const json progress = text_of(map, kProgress, where);
+  if (progress.value("recording", json()) != recording)
+    throw ConfigError(describe_mismatch("--resume", "recording", "the one that " + where + " was made of", "another"));
+  require_same_run(text_of(map, kConfig, where), json(config), where);
+  Checkpoint checkpoint{std::move(map), {}, {}, false};
+  read_progress(progress, where, checkpoint);
+  return checkpoint;
+}
+
+}  // namespace felt::apps

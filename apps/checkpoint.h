@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/reconstruct_report.h"
+#include "mapping/map.h"
+
+namespace felt::apps {
+
+// A reconstruction can go on where an earlier one ended, however that ended: its map file is the checkpoint. The file
+// is whole at every moment (io/atomic_file.h), and besides the map it holds the settings and how far the sequence was
+// read.
+
+/// The part of the settings that shapes what a frame does to a map, as text: what the frame journal notes. Paths and
+/// the selection of frames are left out, so that parts of one recording have the same.
+std::string fusion_settings(const nlohmann::ordered_json& config);
+
+/// Writes the map with all that `resume` needs, and its views where the run ends. `recording`:
+/// SequenceInfo::fingerprint. `config`: settings as used. `viewpoints`: ViewNovelty::seen. `complete`: nothing is left
+/// to do for this map but to mesh it; its recorded touches are in it.
+void save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
+                     bool complete, const std::string& recording, const nlohmann::ordered_json& config,
+                     const std::filesystem::path& path);
+
+/// Where an earlier run ended.
+struct Checkpoint {
+  Map map;
+  FusionRecord record;  ///< what was counted; no times
+  std::vector<Eigen::Isometry3d> viewpoints;
+  bool complete = false;
+};
+
+/// What `save_checkpoint` wrote; nothing where there is no such file. Throws ConfigError that names every setting that
+/// is another now, and FormatError where the file is no map of a reconstruction.
+std::optional<Checkpoint> resume(const std::filesystem::path& path, const std::string& recording,
+                                 const nlohmann::ordered_json& config);
+
+}  // namespace felt::apps

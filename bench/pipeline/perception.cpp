@@ -1,0 +1,79 @@
+// The whole `reconstruct --segmenter` against the network alone on the same number of threads.
+//
+//   bench_perception FELTMAP NET.yaml SEQUENCE [frames=40] [threads=2] [rounds=3]
+//
+// Alone: each thread runs a network of its own on inputs that are ready. Both alternate within one run; medians and
+// their ratio are printed. Fails where the command did not fuse every frame or made no labels.
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "bench/support/bench.h"
+#include "io/segmentation/segmenter.h"
+
+namespace {
+namespace fs = std::filesystem;
+
+double network_alone_s(const felt::NetModel& model, const std::vector<felt::Planes>& inputs, int frames, int threads) {
+  std::vector<std::unique_ptr<felt::Network>> networks;
+  for (int i = 0; i < threads; ++i) networks.push_back(felt::open_network(model));
+  std::atomic<int> next = 0;
+  return felt::bench::seconds([&] {
+    std::vector<std::thread> workers;
+    for (const auto& network : networks)
+      workers.emplace_back([&, own = network.get()] {
+        for (int i; (i = next++) < frames;) own->run(inputs[size_t(i) % inputs.size()]);
+      });
+    for (std::thread& worker : workers) worker.join();
+  });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 4) {
+    std::fprintf(stderr, "usage: bench_perception FELTMAP NET.yaml SEQUENCE [frames] [threads] [rounds]\n");
+    return 2;
+  }
+  const auto number = [&](int i, int otherwise) { return argc > i ? std::atoi(argv[i]) : otherwise; };
+  const int frames = number(4, 40), threads = number(5, 2), rounds = number(6, 3);
+  const felt::Segmenter segmenter(felt::read_net_description(argv[2]), {});
+  const felt::NetModel model = felt::load_net_model(segmenter.description());
+  const auto reader = felt::open_sequence(argv[3]);
+  std::vector<felt::Planes> inputs;
+  for (int64_t i = 0; i < std::min<int64_t>(8, reader->size()); ++i) {
+    const felt::ReadResult result = reader->read(i);
+    if (const auto* frame = std::get_if<felt::Frame>(&result)) inputs.push_back(segmenter.input_of(frame->color));
+  }
+  const fs::path out = fs::temp_directory_path() / "feltmap-bench-perception";
+  const std::string command = std::string("'") + argv[1] + "' reconstruct '" + argv[3] + "' --segmenter '" + argv[2] +
+                              "' --frames 0:" + std::to_string(frames) + " --out '" + out.string() +
+                              "' --force --quiet --threads " + std::to_string(threads);
+  std::vector<double> alone_s, whole_s;
+  nlohmann::json report;
+  for (int round = 0; round < rounds; ++round) {
+    alone_s.push_back(network_alone_s(model, inputs, frames, threads));
+    int status = 0;
+    whole_s.push_back(felt::bench::seconds([&] { status = std::system(command.c_str()); }));
+    if (status != 0) return 1;
+    report = nlohmann::json::parse(std::ifstream(out / "report.json"));
+    if (report["frames"]["fused"] != frames || report["bytes"]["classes"] == 0) {
+      std::fprintf(stderr, "the command fused %s frames\n", report["frames"]["fused"].dump().c_str());
+      return 1;
+    }
+  }
+  const double alone = felt::bench::median(alone_s), whole = felt::bench::median(whole_s);
+  std::printf(
+      "%d frames, %d threads: network alone %.2f s (%.1f ms a frame and thread), whole command %.2f s, ratio %.3f\n",
+      frames, threads, alone, 1e3 * alone * threads / frames, whole, whole / alone);
+  std::printf("last run, seconds of threads: %s\n", report["time_s"].dump().c_str());
+  fs::remove_all(out);
+  return 0;
+}

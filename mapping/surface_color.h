@@ -1,0 +1,40 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mapping/map.h"
+#include "mapping/marching_cubes.h"
+
+namespace felt {
+
+/// What the colours of a surface show.
+struct SurfaceColor {
+  enum class Source { rgb, classes, entropy, mean, sd };
+  Source source = Source::rgb;
+  int property = -1;  ///< of mean and sd: PropertyTable index
+};
+
+/// Reads "rgb", "class", "entropy", "<property>.mean" or "<property>.sd". Throws ConfigError that lists what the map
+/// can show, also where it has no classes.
+SurfaceColor parse_surface_color(const std::string& text, const Map& map);
+
+/// Values that the first and the last colour of a ramp stand for.
+struct ColorRange {
+  float low = 0, high = 0;
+};
+
+/// The voxel nearest to a vertex.
+Index3 nearest_voxel(const VertexEdge& edge);
+
+/// Gives every vertex the colour of what is believed of the voxel nearest to it: of its class by the class table, of
+/// entropy (nats, from 0 to the most that as many classes can have) and of the mean or standard deviation of the next
+/// reading (unit of the property, from the least to the greatest on the surface) by a ramp from black over red to
+/// yellow, and grey where nothing is known. Sets `labels` to class ids (0: nothing known) where the map has classes,
+/// and appends what a ramp shows to `scalars` as "entropy", "<property>_mean" or "<property>_sd". `edges`: of
+/// `extract_mesh`. Returns the range of the ramp; nothing for rgb and class. Vision and touches count alike.
+std::optional<ColorRange> color_surface(const Map& map, const std::vector<VertexEdge>& edges, const SurfaceColor& color,
+                                        TriangleMesh& mesh);
+
+}  // namespace felt

@@ -1,0 +1,161 @@
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
+
+#include "io/map_file.h"
+#include "tests/cli/command.h"
+#include "tests/cli/sequences.h"
+#include "tests/support/data.h"
+
+namespace felt::test {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::string file_text(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+std::string reconstruct(const fs::path& sequence, const fs::path& out, const std::string& options = "") {
+  return "reconstruct " + quoted(sequence) + " --out " + quoted(out) + " --quiet --voxel-size 0.04 " + options;
+}
+
+/// Frames that the checkpoint's run had read; 0 where there is none.
+int64_t frames_in(const fs::path& map) {
+  if (!fs::exists(map)) return 0;
+  return json::parse(load_map(map).metadata.at("progress")).at("read").get<int64_t>();
+}
+
+/// The number in the last "checkpoint after N frames" of a log; 0 without.
+int64_t last_logged(const std::string& log) {
+  const std::string words = "checkpoint after ";
+  const size_t at = log.rfind(words);
+  return at == std::string::npos ? 0 : std::stoll(log.substr(at + words.size()));
+}
+
+size_t parts_in(const fs::path& folder) {
+  size_t parts = 0;
+  for (const auto& entry : fs::directory_iterator(folder))
+    parts += entry.path().filename().string().find(".part-") != std::string::npos;
+  return parts;
+}
+
+}  // namespace
+
+TEST_CASE(
+    "a run killed at any moment loses at most what came after the last checkpoint, and resuming gives the same "
+    "map") {
+  // FELTMAP_KILLS=50 for the long run.
+  const char* asked = std::getenv("FELTMAP_KILLS");
+  const int kills = asked != nullptr ? std::atoi(asked) : 6;
+  constexpr int kEvery = 10;
+  const TemporaryDirectory folder;
+  const fs::path sequence = boxes_repeated(folder.path() / "sequence", 15), whole = folder.path() / "whole",
+                 out = folder.path() / "out";
+  const auto start = std::chrono::steady_clock::now();
+  REQUIRE(run_feltmap(reconstruct(sequence, whole, "--checkpoint 10")).exit_code == 0);
+  const double whole_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const std::string hash = json::parse(file_text(whole / "report.json")).at("map_hash");
+
+  std::mt19937 engine(1);
+  int killed = 0, between = 0;
+  while (killed < kills) {
+    fs::remove_all(out);
+    int64_t saved = 0;
+    for (bool done = false; !done;) {
+      const double pause_s = killed < kills ? whole_s * double(engine() % 1000) / 1000 : 60;
+      const CommandResult run =
+          run_feltmap_within("", reconstruct(sequence, out, "--checkpoint 10 --resume --log-level info"),
+                             " & pid=$!; (sleep " + std::to_string(pause_s) +
+                                 "; kill -9 $pid) 2>/dev/null & wait $pid; code=$?; kill $! 2>/dev/null; exit $code");
+      INFO(run.err);
+      done = run.exit_code == 0;
+      if (done) break;
+      REQUIRE(run.exit_code == 128 + 9);
+      ++killed;
+      const int64_t now = frames_in(out / "map.vdb");
+      CHECK(now >= saved);
+      CHECK((now % kEvery == 0 || now == 180));
+      CHECK(now >= last_logged(run.err));
+      between += now > 0 && now < 180;
+      saved = now;
+    }
+    const json report = json::parse(file_text(out / "report.json"));
+    CHECK(report.at("map_hash") == hash);
+    CHECK(report.at("frames").at("read") == 180);
+    CHECK(report.at("frames").at("fused") == 180);
+    CHECK(file_text(out / "map.vdb") == file_text(whole / "map.vdb"));
+    CHECK(file_text(out / "mesh.ply") == file_text(whole / "mesh.ply"));
+    CHECK(parts_in(out) == 0);
+  }
+  CHECK(between > 0);
+  WARN(killed << " kills, " << between << " of them between the first checkpoint and the end");
+}
+
+TEST_CASE("a run that was interrupted goes on with --resume to the same map") {
+  const TemporaryDirectory folder;
+  const fs::path sequence = boxes_repeated(folder.path() / "sequence", 100), out = folder.path() / "out",
+                 whole = folder.path() / "whole";
+  const CommandResult stopped =
+      run_feltmap_within("", reconstruct(sequence, out, "--checkpoint 10"),
+                         " & until [ -e " + quoted(out / "map.vdb") + " ]; do sleep 0.02; done; kill -INT $!; wait $!");
+  INFO(stopped.err);
+  REQUIRE(stopped.exit_code == 5);
+  CHECK_THAT(stopped.err, Catch::Matchers::Contains("--resume"));
+  const int64_t read = frames_in(out / "map.vdb");
+  CHECK(read > 0);
+  CHECK(read < 1200);
+  REQUIRE(run_feltmap(reconstruct(sequence, out, "--checkpoint 10 --resume")).exit_code == 0);
+  REQUIRE(run_feltmap(reconstruct(sequence, whole)).exit_code == 0);
+  const json report = json::parse(file_text(out / "report.json"));
+  CHECK(report.at("frames").at("resumed_after") == read);
+  CHECK(report.at("frames").at("fused") == 1200);
+  CHECK(report.at("map_hash") == json::parse(file_text(whole / "report.json")).at("map_hash"));
+}
+
+TEST_CASE("resuming with another recording or other settings is refused, each named, and the map stays") {
+  const TemporaryDirectory folder;
+  const fs::path out = folder.path() / "out", other = boxes_repeated(folder.path() / "other", 2);
+  REQUIRE(run_feltmap(reconstruct(boxes(), out)).exit_code == 0);
+  const std::string map = file_text(out / "map.vdb");
+  const CommandResult settings = run_feltmap(reconstruct(boxes(), out, "--resume --max-depth 3 --weight sensor-noise"));
+  CHECK(settings.exit_code == 3);
+  CHECK_THAT(settings.err, Catch::Matchers::Contains("max_depth_m: expected 4.0") &&
+                               Catch::Matchers::Contains("weight: expected \"constant\""));
+  const CommandResult recording = run_feltmap(reconstruct(other, out, "--resume"));
+  CHECK(recording.exit_code == 3);
+  CHECK_THAT(recording.err, Catch::Matchers::Contains("recording"));
+  CHECK(file_text(out / "map.vdb") == map);
+  std::ofstream(out / "map.vdb", std::ios::app) << "x";
+  CHECK(run_feltmap(reconstruct(boxes(), out, "--resume")).exit_code == 4);
+}
+
+TEST_CASE("parts of a recording merge, and parts that share frames are refused, wherever the recording lies") {
+  const TemporaryDirectory folder;
+  const fs::path copy = folder.path() / "copy";
+  fs::copy(boxes(), copy, fs::copy_options::recursive);
+  const auto part = [&](const fs::path& sequence, const char* name, const char* frames) {
+    REQUIRE(run_feltmap(reconstruct(sequence, folder.path() / name, std::string("--frames ") + frames)).exit_code == 0);
+    return quoted(folder.path() / name / "map.vdb");
+  };
+  const std::string even = part(boxes(), "even", "0::2"), odd = part(boxes(), "odd", "1::2"),
+                    third = part(copy, "third", "0::3"), all = part(boxes(), "all", ":");
+  const std::string merged = quoted(folder.path() / "merged.vdb");
+  const CommandResult good = run_feltmap("merge " + odd + " " + even + " --out " + merged + " --json");
+  INFO(good.err);
+  REQUIRE(good.exit_code == 0);
+  CHECK(json::parse(good.out).at("frames") == 12);
+  CHECK(run_feltmap("diff " + merged + " " + all + " --tol 0.05").exit_code == 0);
+  const CommandResult bad = run_feltmap("merge " + even + " " + third + " --out " + merged + "2");
+  CHECK(bad.exit_code == 3);
+  CHECK_THAT(bad.err, Catch::Matchers::Contains("2 shared"));
+  CHECK(run_feltmap("merge " + even + " " + third + " --allow-shared-frames --out " + merged + "2").exit_code == 0);
+}
+
+}  // namespace felt::test

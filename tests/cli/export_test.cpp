@@ -1,0 +1,184 @@
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "io/map_file.h"
+#include "io/mesh_io.h"
+#include "mapping/touch_update.h"
+#include "tests/cli/command.h"
+#include "tests/cli/sequences.h"
+#include "tests/support/data.h"
+#include "tests/support/labelled_map.h"
+
+namespace felt::test {
+namespace {
+namespace fs = std::filesystem;
+using Catch::Matchers::Contains;
+using nlohmann::json;
+
+/// Lines of a program that is not ours, by their first word.
+std::map<std::string, std::vector<std::string>> lines_of(const std::string& program, const fs::path& file) {
+  const TemporaryDirectory directory;
+  const fs::path reader = command().parent_path().parent_path() / "tests" / program, out = directory.path() / "out";
+  REQUIRE(std::system((quoted(reader) + " " + quoted(file) + " > " + quoted(out)).c_str()) == 0);
+  std::map<std::string, std::vector<std::string>> lines;
+  std::ifstream in(out);
+  for (std::string line; std::getline(in, line);) {
+    std::istringstream words(line);
+    std::string name;
+    words >> name;
+    for (std::string word; words >> word;) lines[name].push_back(word);
+  }
+  return lines;
+}
+
+/// A floor, wood on the left of x = 0 and ice on its right, touched on the right.
+struct TouchedFloor {
+  TemporaryDirectory directory;
+  fs::path map = directory.path() / "map.vdb";
+  TouchedFloor() {
+    Map floor = labelled_map(
+        0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
+        class_table({"wood", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 2; });
+    Property friction;
+    friction.name = "friction";
+    friction.priors = {{"wood", {0.4, 0.05, 50}}, {"ice", {0.1, 0.03, 50}}};
+    floor.properties = PropertyTable({friction});
+    TouchRequest request;
+    request.point_m = {0.2, 0, 0};
+    request.property = "friction";
+    request.value = 0.12;
+    add_touch(floor, resolve_touch(floor, request));
+    save_map(floor, map);
+  }
+  json exported(const std::string& options) const {
+    const CommandResult result = run_feltmap("export --json --force " + quoted(map) + " " + options);
+    INFO(options << "\n" << result.err);
+    REQUIRE(result.exit_code == 0);
+    return json::parse(result.out);
+  }
+};
+
+std::set<std::tuple<int, int, int>> colors_of(const TriangleMesh& mesh) {
+  std::set<std::tuple<int, int, int>> colors;
+  for (const Rgba8& c : mesh.colors) colors.insert({c.r, c.g, c.b});
+  return colors;
+}
+
+}  // namespace
+
+TEST_CASE("a GLB file is what a reader that is not ours expects, for every kind of colour") {
+  const TouchedFloor floor;
+  for (const char* color : {"rgb", "class", "entropy", "friction.mean", "friction.sd"}) {
+    INFO(color);
+    const fs::path file = floor.directory.path() / "floor.glb";
+    const json written = floor.exported("--mesh " + quoted(file) + " --color-by " + color);
+    auto found = lines_of("stock_glb_reader", file);
+    const std::string vertices = written["mesh"]["vertices"].dump();
+    REQUIRE(found.at("POSITION").size() == 5);
+    CHECK(found["mode"][0] == "4");
+    CHECK(found["POSITION"][2] == vertices);
+    CHECK(std::stod(found["POSITION"][3]) == Approx(-0.4).margin(0.03));
+    CHECK(std::stod(found["POSITION"][4]) == Approx(0.4).margin(0.03));
+    CHECK(found.at("NORMAL")[2] == vertices);
+    CHECK(std::stoul(found.at("indices")[2]) == 3 * written["mesh"]["triangles"].get<size_t>());
+    CHECK(std::stoul(found["indices"][4]) + 1 == written["mesh"]["vertices"].get<size_t>());
+    if (std::string(color) == "rgb") continue;  // the floor was never photographed
+    CHECK(found.at("COLOR_0")[0] == "4");
+    CHECK(found["COLOR_0"][2] == vertices);
+  }
+  const fs::path cloud = floor.directory.path() / "cloud.glb";
+  floor.exported("--points " + quoted(cloud) + " --color-by class");
+  CHECK(lines_of("stock_glb_reader", cloud).at("mode")[0] == "0");
+}
+
+TEST_CASE("colours of a surface say what is believed, and the scale is stated") {
+  const TouchedFloor floor;
+  const fs::path file = floor.directory.path() / "floor.ply";
+  const json by_mean = floor.exported("--mesh " + quoted(file) + " --color-by friction.mean");
+  const TriangleMesh mesh = read_mesh(file);
+  const std::vector<float>* mean = TriangleMesh::find(mesh.scalars, "friction_mean");
+  REQUIRE(mean != nullptr);
+  for (size_t i = 0; i < mesh.positions.size(); ++i) {
+    const float x = mesh.positions[i].x();
+    // Vision is not sure of its classes: the mean is between the two, nearer to that of the class which it saw.
+    if (x < -0.05f) CHECK((*mean)[i] > 0.28f);
+    if (x > 0.05f) CHECK((*mean)[i] < 0.2f);
+  }
+  CHECK(by_mean["colors"]["black"].get<float>() == *std::min_element(mean->begin(), mean->end()));
+  CHECK(by_mean["colors"]["yellow"].get<float>() == *std::max_element(mean->begin(), mean->end()));
+
+  floor.exported("--mesh " + quoted(file) + " --color-by class");
+  CHECK(colors_of(read_mesh(file)).size() == 2);
+  const CommandResult unknown =
+      run_feltmap("export --force " + quoted(floor.map) + " --mesh " + quoted(file) + " --color-by stiffness.mean");
+  CHECK(unknown.exit_code == 3);
+  CHECK_THAT(unknown.err, Contains("friction.mean") && Contains("stiffness.mean"));
+}
+
+TEST_CASE("a class, a box and a segment cut the surface and the grids where they end") {
+  const TouchedFloor floor;
+  const fs::path ply = floor.directory.path() / "part.ply", vdb = floor.directory.path() / "part.vdb";
+  const auto extent = [&](const std::string& options) {
+    floor.exported(options + " --mesh " + quoted(ply) + " --vdb " + quoted(vdb));
+    const TriangleMesh mesh = read_mesh(ply);
+    REQUIRE_FALSE(mesh.triangles.empty());
+    float least = 1, greatest = -1;
+    for (const Eigen::Vector3f& p : mesh.positions)
+      least = std::min(least, p.x()), greatest = std::max(greatest, p.x());
+    const Map part = load_map(vdb);
+    REQUIRE(active_voxel_count(part) > 0);
+    CHECK(part.properties.size() == 1);
+    return std::pair(least, greatest);
+  };
+  const auto [wood_least, wood_greatest] = extent("--class wood");
+  CHECK(wood_least == Approx(-0.4).margin(0.03));
+  CHECK(wood_greatest < 0.02f);
+  const auto [box_least, box_greatest] = extent("--box -0.2,-0.2,-0.05,0.1,0.2,0.05");
+  CHECK(box_least == Approx(-0.2).margin(0.03));
+  CHECK(box_greatest == Approx(0.1).margin(0.03));
+  const auto [ice_least, ice_greatest] = extent("--segment-at 0.2,0,0");
+  CHECK(ice_least > -0.02f);
+  CHECK(ice_greatest == Approx(0.4).margin(0.03));
+  const auto [both_least, both_greatest] = extent("--segment-at 0.2,0,0 --box 0.1,-0.2,-0.05,0.2,0.2,0.05");
+  CHECK(both_least == Approx(0.1).margin(0.03));
+  CHECK(both_greatest == Approx(0.2).margin(0.03));
+  const CommandResult missed =
+      run_feltmap("export --force " + quoted(floor.map) + " --mesh " + quoted(ply) + " --segment-at 5,5,5");
+  CHECK(missed.exit_code != 0);
+  CHECK_THAT(missed.err, Contains("feltmap: error"));
+}
+
+TEST_CASE("a compact VDB holds the chosen grids in 16 bits, for a reader that is not ours") {
+  const TouchedFloor floor;
+  const fs::path whole = floor.directory.path() / "whole.vdb", compact = floor.directory.path() / "compact.vdb";
+  floor.exported("--vdb " + quoted(whole) + " --grids tsdf,evidence/");
+  const json written = floor.exported("--vdb " + quoted(compact) + " --grids tsdf,evidence/ --half");
+  CHECK(written["vdb"]["grids"] == json({"tsdf", "evidence/wood", "evidence/ice"}));
+  CHECK(written["vdb"]["bytes"].get<size_t>() < fs::file_size(whole));
+  auto exact = lines_of("stock_vdb_reader", whole), half = lines_of("stock_vdb_reader", compact);
+  REQUIRE(half.size() == 3);
+  CHECK(half["tsdf"][0] == "float");
+  CHECK(half["tsdf"][2] == exact["tsdf"][2]);
+  // 11 bits of mantissa: within 2^-11 of 0.08.
+  for (const int limit : {4, 5})
+    CHECK(std::abs(std::stod(half["tsdf"][limit]) - std::stod(exact["tsdf"][limit])) < 4e-5);
+
+  const json part = floor.exported("--vdb " + quoted(compact) + " --grids tsdf,touched --half --class ice");
+  auto ice = lines_of("stock_vdb_reader", compact);
+  CHECK(std::stoul(ice["tsdf"][2]) < std::stoul(exact["tsdf"][2]) / 2);
+  CHECK(std::stoul(ice["touched"][2]) > 0);
+  const CommandResult unknown =
+      run_feltmap("export --force " + quoted(floor.map) + " --vdb " + quoted(compact) + " --grids colour");
+  CHECK(unknown.exit_code == 3);
+  CHECK_THAT(unknown.err, Contains("'colour'") && Contains("evidence/ice"));
+}
+
+}  // namespace felt::test

@@ -1,0 +1,206 @@
+#include "tests/fuzz/harness.h"
+
+#include <stdlib.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "core/error.h"
+#include "core/frame_selection.h"
+#include "io/camera_file.h"
+#include "io/class_table_file.h"
+#include "io/confusion_file.h"
+#include "io/fit_priors.h"
+#include "io/friction_log.h"
+#include "io/image_decode.h"
+#include "io/image_encode.h"
+#include "io/infer_json.h"
+#include "io/map_file.h"
+#include "io/map_trailer.h"
+#include "io/mask_image.h"
+#include "io/mesh_io.h"
+#include "io/open_sequence.h"
+#include "io/pose_list.h"
+#include "io/property_yaml.h"
+#include "io/reconstruct_config.h"
+#include "io/simulation/scene_file.h"
+#include "io/touch_json.h"
+#include "io/touches.h"
+#include "io/trajectory_file.h"
+#include "mapping/map_verify.h"
+
+namespace felt::fuzz {
+namespace {
+namespace fs = std::filesystem;
+
+/// A folder of this process, removed at its end.
+const fs::path& scratch_folder() {
+  static const struct Folder {
+    Folder() {
+      std::string name = (fs::temp_directory_path() / "feltmap-fuzz-XXXXXX").string();
+      if (mkdtemp(name.data()) == nullptr) std::abort();
+      path = name;
+    }
+    ~Folder() {
+      std::error_code fault;
+      fs::remove_all(path, fault);
+    }
+    fs::path path;
+  } folder;
+  return folder.path;
+}
+
+/// The bytes as a file, for readers that take a path.
+fs::path as_file(const std::string& name, const std::string& bytes) {
+  const fs::path path = scratch_folder() / name;
+  std::ofstream(path, std::ios::binary | std::ios::trunc).write(bytes.data(), std::streamsize(bytes.size()));
+  return path;
+}
+
+std::span<const uint8_t> as_image(const std::string& bytes) {
+  return {reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()};
+}
+
+/// Not an Error: a reader that contradicts itself is a finding.
+void require(bool condition, const char* what) {
+  if (!condition) throw std::logic_error(what);
+}
+
+/// Runs several readers over the same bytes; refused where all refuse.
+template <typename... Reads>
+void any_of(Reads... reads) {
+  int refused = 0;
+  const auto attempt = [&](auto read) {
+    try {
+      read();
+    } catch (const Error&) {
+      if (++refused == int(sizeof...(reads))) throw;
+    }
+  };
+  (attempt(reads), ...);
+}
+
+const ClassTable& classes() {
+  static const ClassTable table({{0, "none", {}, true}, {1, "wood", {}, false}, {2, "ice", {}, false}});
+  return table;
+}
+
+void read_classes_csv(const std::string& bytes) { read_class_table(as_file("classes.csv", bytes)); }
+void read_classes_yaml(const std::string& bytes) { read_class_table(as_file("classes.yaml", bytes)); }
+void read_camera(const std::string& bytes) { read_camera_file(as_file("camera.txt", bytes)); }
+void read_config(const std::string& bytes) { read_reconstruct_config(as_file("config.yaml", bytes)); }
+void read_confusion(const std::string& bytes) { parse_confusion_matrix(bytes, classes(), "confusion.csv"); }
+void read_frames(const std::string& bytes) { parse_frame_selection(bytes, "--frames"); }
+void read_obj(const std::string& bytes) { parse_obj(bytes, "mesh.obj"); }
+void read_ply(const std::string& bytes) { parse_ply(bytes, "mesh.ply"); }
+void read_point_list(const std::string& bytes) { read_points(as_file("points.csv", bytes)); }
+void read_priors(const std::string& bytes) { fit_priors_json(read_readings_csv(as_file("readings.csv", bytes)), 100); }
+void read_scene_yaml(const std::string& bytes) { parse_scene(bytes, "scene.yaml"); }
+void read_touches_csv(const std::string& bytes) { parse_touches(bytes, "touches.csv"); }
+
+void read_friction(const std::string& bytes) { friction_reading(parse_force_log(bytes, "log.csv"), {}); }
+
+void read_image(const std::string& bytes) {
+  any_of([&] { read_image_header(as_image(bytes), "image"); }, [&] { decode_gray16(as_image(bytes), "image"); },
+         [&] { decode_color(as_image(bytes), "image"); });
+}
+
+void read_infer(const std::string& bytes) {
+  const InferAnswer answer = infer_json_line(bytes, 1);
+  require(!answer.json.empty() && answer.json.find('\n') == std::string::npos, "not one line of JSON");
+  if (answer.failed) throw FormatError(answer.json);
+}
+
+/// The content of a map file behind a checksum that is right, which damage alone never gives.
+void read_map(const std::string& bytes) {
+  const fs::path path = as_file("map.vdb", bytes);
+  const std::string trailer = make_map_trailer(path, kMapFileVersion);
+  std::ofstream(path, std::ios::binary | std::ios::app) << trailer;
+  verify(load_map(path));
+}
+
+void read_poses_text(const std::string& bytes) {
+  const fs::path path = as_file("poses.txt", bytes);
+  any_of([&] { read_poses(path); }, [&] { read_trajectory(path, true); }, [&] { read_trajectory(path, false); },
+         [&] { read_pose_file(path); });
+}
+
+void read_properties_yaml(const std::string& bytes) {
+  const PropertyTable table = parse_properties(bytes, "properties.yaml");
+  require(parse_properties(properties_yaml(table), "written") == table, "a property table changes when written");
+}
+
+/// Opens the sequence and reads its first frames.
+void read_frames_of(const fs::path& path, const std::string& format) {
+  SequenceOptions options;
+  options.format = format;
+  const auto sequence = open_sequence(path, options);
+  for (int64_t i = 0; i < std::min<int64_t>(3, sequence->size()); ++i) sequence->read(i);
+}
+
+void read_sens(const std::string& bytes) { read_frames_of(as_file("scan.sens", bytes), "sens"); }
+
+/// One view of 8 x 6 pixels below the description.
+void read_sequence_yaml(const std::string& bytes) {
+  const fs::path folder = scratch_folder() / "sequence";
+  if (fs::create_directories(folder / "depth")) {
+    write_bytes(folder / "depth" / "0.png", encode_png(Image<uint16_t>(8, 6, 1500)));
+    as_file("sequence/poses.txt", "0 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n");
+  }
+  as_file("sequence/sequence.yaml", bytes);
+  read_frames_of(folder, "generic");
+}
+
+void read_touch_journal(const std::string& bytes) {
+  const TouchJournal journal = parse_touch_journal(bytes, "touch journal");
+  const std::string text = touch_journal_json(journal);
+  require(touch_journal_json(parse_touch_journal(text, "written")) == text, "a touch journal changes when written");
+}
+
+// Decoders keep buffers of a fixed size. Text: a word of a few bytes may become a node of a document or a row of
+// numbers. Images: a byte of deflate is up to 1032 bytes, which are eight pixels each at one bit a pixel, which are
+// four bytes each as colour.
+constexpr size_t kFree = size_t(16) << 20, kText = 2000, kImage = size_t(1032) * 8 * 6;
+// Map: a leaf of 130 bytes becomes planes of up to 4 KiB; the journal may name ten million frames in a few bytes.
+constexpr size_t kMapFree = size_t(128) << 20, kMap = 200;
+
+constexpr Harness kHarnesses[] = {
+    {"camera", read_camera, kFree, kText},
+    {"classes_csv", read_classes_csv, kFree, kText},
+    {"classes_yaml", read_classes_yaml, kFree, kText},
+    {"config", read_config, kFree, kText},
+    {"confusion", read_confusion, kFree, kText},
+    {"frames", read_frames, kFree, kText},
+    {"friction", read_friction, kFree, kText},
+    {"image", read_image, kFree, kImage},
+    {"infer", read_infer, kFree, kText},
+    {"map", read_map, kMapFree, kMap},
+    {"obj", read_obj, kFree, kText},
+    {"ply", read_ply, kFree, kText},
+    {"points", read_point_list, kFree, kText},
+    {"poses", read_poses_text, kFree, kText},
+    {"priors", read_priors, kFree, kText},
+    {"properties", read_properties_yaml, kFree, kText},
+    {"scene", read_scene_yaml, kFree, kText},
+    {"sens", read_sens, kFree, kImage},
+    {"sequence", read_sequence_yaml, kFree, kText},
+    {"touch_journal", read_touch_journal, kFree, kText},
+    {"touches", read_touches_csv, kFree, kText},
+};
+
+}  // namespace
+
+std::span<const Harness> harnesses() { return kHarnesses; }
+
+bool accepted(const Harness& harness, const std::string& bytes) {
+  try {
+    harness.read(bytes);
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+}  // namespace felt::fuzz
