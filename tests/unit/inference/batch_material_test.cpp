@@ -107,9 +107,8 @@ double worst_over_bound(unsigned seed, size_t k, double location, double scale, 
       const MaterialPlanes& p = classes[c];
       const Nig& x = view.nig[c];
       see(std::abs(double(p.a[v]) - view.a[c]) / total);
-      // Of the way that tau has gone f32 keeps seven digits, however many spreads of the class that is.
-      const double way = 4e-7 * std::abs(x.tau - p.tau_origin);
-      see(std::max(0.0, std::abs(double(p.tau[v]) + p.tau_origin - x.tau) - way) / std::sqrt(plug_in_variance(x)));
+      const double moved = std::abs(x.tau - prior[c].tau);  // may be thousands of spreads of the class
+      see(std::abs(double(p.tau[v]) + p.tau_origin - x.tau) / std::max(moved, std::sqrt(plug_in_variance(x))));
       see(relative_error(double(p.kappa[v]), x.kappa));
       see(relative_error(double(p.beta[v]), x.beta));
       see(relative_error(double(p.gamma[v]), x.gamma));
