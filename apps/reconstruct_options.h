@@ -6,6 +6,7 @@
 #include <string>
 
 #include "apps/perception_options.h"
+#include "apps/reading_options.h"
 #include "io/label_settings.h"
 #include "io/sequence_options.h"
 #include "mapping/integration_config.h"
@@ -30,14 +31,15 @@ struct ReconstructOptions {
 
 /// The command line's own words. What is left empty keeps the default or the configuration file's value.
 struct ReconstructArguments {
-  std::filesystem::path config, sequence, out, labels, probs, classes, properties, touches;
-  std::string format, intrinsics, pose_convention, depth_encoding, frames, truncation;
-  std::optional<double> depth_scale, max_dt_s, voxel_size_m, min_depth_m, max_depth_m, max_weight;
+  std::filesystem::path config, sequence, out, properties, touches;
+  ReadingArguments reading;
+  std::string truncation;
+  std::optional<double> voxel_size_m, min_depth_m, max_depth_m, max_weight;
   std::optional<DistanceModel> distance;
   std::optional<WeightModel> weight;
   PerceptionArguments perception;
   LabelSettings label_settings;
-  bool ray_length = false, no_color = false, carve = false, overwrite = false, resume = false;
+  bool carve = false, overwrite = false, resume = false;
   int64_t checkpoint_every = 0;
 };
 

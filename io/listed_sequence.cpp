@@ -5,14 +5,13 @@
 #include <fstream>
 
 #include "core/error.h"
-#include "core/pose.h"
 #include "io/camera_file.h"
 #include "io/image_decode.h"
 #include "io/probability_images.h"
+#include "io/recorded_pose.h"
 #include "io/registration.h"
 #include "io/sequence_fingerprint.h"
 #include "io/text_input.h"
-#include "io/trajectory_file.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -77,6 +76,7 @@ private:
   DepthImage read_depth(const ImageSource& source) const;
   ColorImage read_color(const ImageSource& source, const DepthImage& depth_m) const;
   Image<uint16_t> read_ids(const ImageSource& source, const std::string& kind, const DepthImage& depth_m) const;
+  LabelImage read_labels(const ImageSource& source, const DepthImage& depth_m) const;
   Image<uint16_t> read_masks(const std::vector<ImageSource>& masks, const DepthImage& depth_m) const;
   ProbabilityImage read_probabilities(const ImageSource& source, const LabelImage& labels) const;
   ProbabilityImage read_class_maps(const FrameRecord& frame) const;
@@ -85,7 +85,8 @@ private:
 
   SequenceListing listing_;
   SequenceInfo info_;
-  bool with_color_, with_instances_;
+  bool with_color_, with_instances_, bgr_;
+  int label_offset_;
   Image<float> z_per_ray_length_;  ///< empty where depth lies along the optical axis
 };
 
@@ -111,6 +112,8 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
     throw ConfigError(describe_mismatch("frames " + to_string(options.frames), "selection",
                                         "some of the " + std::to_string(info_.recorded_frames) + " frames", "none"));
   const auto any = [&](auto test) { return std::any_of(listing_.frames.begin(), listing_.frames.end(), test); };
+  bgr_ = options.bgr;
+  label_offset_ = options.label_offset;
   with_color_ = options.read_color && any([](const FrameRecord& f) { return !f.color.empty(); });
   info_.has_color = with_color_;
   info_.has_labels = any([](const FrameRecord& f) { return !f.labels.empty(); });
@@ -168,7 +171,7 @@ ReadResult ListedSequence::read(int64_t i) const {
     frame.T_world_camera = read_pose(record);
     frame.depth_m = read_depth(record.depth);
     if (with_color_) frame.color = read_color(record.color, frame.depth_m);
-    if (!record.labels.empty()) frame.labels = read_ids(record.labels, "label", frame.depth_m);
+    if (!record.labels.empty()) frame.labels = read_labels(record.labels, frame.depth_m);
     if (with_instances_ && !record.instances.empty())
       frame.instances = read_ids(record.instances, "instance", frame.depth_m);
     if (with_instances_ && !record.masks.empty()) frame.instances = read_masks(record.masks, frame.depth_m);
@@ -183,32 +186,9 @@ ReadResult ListedSequence::read(int64_t i) const {
 }
 
 Eigen::Isometry3d ListedSequence::read_pose(const FrameRecord& frame) const {
-  Eigen::Matrix4d recorded;
-  std::string where = "trajectory";
-  if (frame.pose) {
-    recorded = *frame.pose;
-  } else if (std::error_code fault; frame.pose_file.empty() || !fs::exists(frame.pose_file, fault)) {
-    throw Skip{"missing pose", "no pose recorded"};
-  } else {
-    where = frame.pose_file.string();
-    try {
-      recorded = read_pose_file(frame.pose_file);
-    } catch (const Error& problem) {
-      throw Skip{"unreadable pose", problem.what()};
-    }
-  }
-  Eigen::Isometry3d T;
-  switch (rigid_pose(recorded, T)) {
-    case PoseFault::not_finite:
-      throw Skip{"non-finite pose", where};
-    case PoseFault::not_rigid:
-      throw Skip{"non-rigid pose", where};
-    case PoseFault::none:
-      break;
-  }
-  if (listing_.pose_convention.world_to_camera) T = T.inverse();
-  if (listing_.pose_convention.opengl_axes) T.linear() = T.linear() * Eigen::Vector3d(1, -1, -1).asDiagonal();
-  return T;
+  const auto recorded = recorded_pose(frame);
+  if (const auto* problem = std::get_if<PoseProblem>(&recorded)) throw Skip{problem->reason, problem->detail};
+  return camera_pose(std::get<Eigen::Isometry3d>(recorded), listing_.pose_convention, listing_.T_body_camera);
 }
 
 DepthImage ListedSequence::read_depth(const ImageSource& source) const {
@@ -249,6 +229,8 @@ PinholeCamera ListedSequence::camera_of_color_grid(int width, int height) const 
 
 ColorImage ListedSequence::read_color(const ImageSource& source, const DepthImage& depth_m) const {
   ColorImage image = decoded(source, "colour", decode_color);
+  if (bgr_)
+    for (Rgba8& pixel : image) std::swap(pixel.r, pixel.b);
   if (on_depth_grid(image.width(), image.height())) return image;
   return registered_to_depth(image, camera_of_color_grid(image.width(), image.height()), depth_m, info_.camera,
                              listing_.T_color_depth, Rgba8{0, 0, 0, 0});
@@ -266,6 +248,16 @@ Image<uint16_t> ListedSequence::read_ids(const ImageSource& source, const std::s
                                  size_text(image.width(), image.height()))};
   return registered_to_depth<uint16_t>(image, camera_of_color_grid(image.width(), image.height()), depth_m,
                                        info_.camera, listing_.T_color_depth, kNoLabel);
+}
+
+LabelImage ListedSequence::read_labels(const ImageSource& source, const DepthImage& depth_m) const {
+  LabelImage labels = read_ids(source, "label", depth_m);
+  for (uint16_t& id : labels) {
+    if (label_offset_ == 0) break;
+    const int moved = id + label_offset_;
+    if (id != kNoLabel) id = moved >= 0 && moved < kNoLabel ? uint16_t(moved) : kNoLabel;
+  }
+  return labels;
 }
 
 Image<uint16_t> ListedSequence::read_masks(const std::vector<ImageSource>& masks, const DepthImage& depth_m) const {

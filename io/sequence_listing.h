@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -54,7 +54,9 @@ struct SequenceListing {
   DepthEncoding depth_encoding = DepthEncoding::plain;
   bool depth_is_ray_length = false;
   PoseConvention pose_convention;
+  Eigen::Isometry3d T_body_camera = Eigen::Isometry3d::Identity();  ///< where poses are those of a body
   ClassTable classes;
+  bool stamped = false;  ///< frames carry times in seconds; otherwise `stamp_s` is the frame number
   std::filesystem::path properties_file, touches_file;  ///< empty: the sequence carries none
   std::vector<std::string> notes;
 };

@@ -143,6 +143,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   for (const auto* files : {&depth, &color})
     for (const auto& [number, image] : *files) all.insert(number);
   for (const auto& [number, pose] : pose_of) all.insert(number);
+  listing.stamped = !by_number;
   size_t position = 0;
   for (const int64_t number : all) {
     FrameRecord frame;
