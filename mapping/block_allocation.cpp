@@ -3,11 +3,13 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <span>
 
 #include "core/error.h"
-#include "mapping/tsdf_kernels.h"
+#include "mapping/survey_kernels.h"
 
 namespace felt {
 namespace {
@@ -41,27 +43,19 @@ ViewBox view_box(const PinholeCamera& camera, const Eigen::Isometry3d& T_world_c
   return {lowest, block_of(box.max()) - lowest + Eigen::Vector3d::Ones()};
 }
 
-/// Smallest and largest usable depth; false where there is none.
-bool depth_range(const DepthImage& depth_m, float min_depth_m, float max_depth_m, float& low, float& high) {
-  low = max_depth_m, high = 0;
-  for (const float d : depth_m) {
-    const bool usable = d >= min_depth_m && d <= max_depth_m;
-    low = usable && d < low ? d : low;
-    high = usable && d > high ? d : high;
-  }
-  return high > 0;
-}
-
 /// Coordinates of the marked cells, ascending.
-std::vector<BlockCoord> marked_blocks(const std::vector<uint8_t>& cells, const ViewBox& box) {
+std::vector<BlockCoord> marked_blocks(const std::vector<uint8_t>& marks, const ViewBox& box) {
   const Eigen::Vector3i lowest = box.lowest.cast<int>(), extent = box.cells.cast<int>();
   std::vector<BlockCoord> blocks;
-  constexpr size_t kWord = 8;
-  for (size_t word = 0; word < cells.size(); word += kWord) {
-    const size_t length = std::min(kWord, cells.size() - word);
-    uint64_t eight = 0;
-    std::memcpy(&eight, &cells[word], length);
-    for (size_t cell = word; eight != 0 && cell < word + length; ++cell) {
+  const std::span cells(marks.data(), marks.size() - 1);  // without the spare one
+  constexpr size_t kAtOnce = 64;                          // most of the box is empty
+  for (size_t begin = 0; begin < cells.size(); begin += kAtOnce) {
+    uint64_t words[kAtOnce / 8] = {};
+    const size_t length = std::min(kAtOnce, cells.size() - begin);
+    std::memcpy(words, &cells[begin], length);
+    uint64_t any = 0;
+    for (const uint64_t word : words) any |= word;
+    for (size_t cell = begin; any != 0 && cell < begin + length; ++cell) {
       if (cells[cell] == 0) continue;
       const auto column = int(cell / size_t(extent.z()));
       blocks.push_back({lowest.x() + column / extent.y(), lowest.y() + column % extent.y(),
@@ -71,40 +65,94 @@ std::vector<BlockCoord> marked_blocks(const std::vector<uint8_t>& cells, const V
   return blocks;
 }
 
+/// Distance in pixels between the pixels of a tile that are looked at: a quarter of a block on the tile's farthest
+/// surface, half of that where the tile sees more than one surface.
+int stride_in_tile(const DepthRange& tile, float quarter_block_px, float truncation_m) {
+  const float farthest_m = -tile.minus_farthest_m;
+  float apart_px = quarter_block_px / farthest_m;
+  if (farthest_m - tile.nearest_m > truncation_m) apart_px *= 0.5f;
+  int stride = DepthTiles::kFinestTile;
+  while (stride > 1 && float(stride) > apart_px) stride /= 2;
+  return stride;
+}
+
+/// Marks the cells that a row of the finest tiles sees.
+void mark_tile_row(const DepthImage& depth_m, float min_depth_m, float max_depth_m, const DepthRange* tiles,
+                   int columns, int tile_row, float quarter_block_px, float truncation_m, const AllocationView& view,
+                   uint8_t* cells) {
+  constexpr int kTile = DepthTiles::kFinestTile;
+  std::array<uint8_t, RowSamples::kMost / kTile> strides;
+  RowSamples samples;
+  for (int first = 0; first < columns; first += int(strides.size())) {
+    const int count = std::min(columns - first, int(strides.size()));
+    for (int c = 0; c < count; ++c) {
+      const DepthRange& tile = tiles[first + c];
+      const bool empty = tile.nearest_m > max_depth_m;
+      strides[size_t(c)] = empty ? 0 : uint8_t(stride_in_tile(tile, quarter_block_px, truncation_m));
+    }
+    for (int y = 0; y < kTile; ++y) {
+      const int v = tile_row * kTile + y;
+      if (v >= depth_m.height()) break;
+      const float* row = depth_m.row(v);
+      samples.count = 0;
+      for (int c = 0; c < count; ++c) {
+        const int stride = strides[size_t(c)];
+        if (stride == 0 || y % stride != stride / 2) continue;
+        const int begin = (first + c) * kTile, end = std::min(depth_m.width(), begin + kTile);
+        for (int u = begin + stride / 2; u < end; u += stride) {
+          samples.u[samples.count] = float(u);
+          samples.depth_m[samples.count] = row[u];
+          samples.count += row[u] >= min_depth_m && row[u] <= max_depth_m;
+        }
+      }
+      mark_cells(view, v, samples, cells);
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<BlockCoord> blocks_in_view(const DepthImage& depth_m, const PinholeCamera& camera,
                                        const Eigen::Isometry3d& T_world_camera, double voxel_size_m,
                                        double truncation_m, float min_depth_m, float max_depth_m,
                                        AllocationScratch& scratch) {
+  const int width = depth_m.width(), height = depth_m.height();
+  DepthTiles& tiles = scratch.tiles;
+  shape_tiles(width, height, tiles);
+  DepthTiles::Level& finest = tiles.levels[0];
+  const auto survey = [&](int tile_row) {
+    tile_range_row(depth_m.data(), width, height, tile_row, min_depth_m, max_depth_m, finest.row(tile_row));
+  };
+  constexpr int kTileRowsATask = 8;
+  const tbb::blocked_range<int> all_tile_rows(0, finest.rows, kTileRowsATask);
+
   double farthest_m = max_depth_m;
   ViewBox box = view_box(camera, T_world_camera, voxel_size_m, 0, farthest_m + truncation_m);
-  if (!(box.count() <= kCheapCells)) {
-    float low = 0, high = 0;
-    if (!depth_range(depth_m, min_depth_m, max_depth_m, low, high)) return {};
-    farthest_m = high;
-    box = view_box(camera, T_world_camera, voxel_size_m, std::max(0.0, low - truncation_m), high + truncation_m);
+  const bool fitted = !(box.count() <= kCheapCells);
+  if (fitted) {
+    tbb::parallel_for(all_tile_rows, [&](const tbb::blocked_range<int>& range) {
+      for (int row = range.begin(); row < range.end(); ++row) survey(row);
+    });
+    const DepthRange depth = range_of_image(tiles);
+    if (!(-depth.minus_farthest_m > 0)) return {};
+    farthest_m = -depth.minus_farthest_m;
+    box = view_box(camera, T_world_camera, voxel_size_m, std::max(0.0, depth.nearest_m - truncation_m),
+                   farthest_m + truncation_m);
   }
   if (!box.on_map()) return {};
   if (box.count() > kMostCells)
     throw ConfigError(
         describe_mismatch("depth fusion", "blocks in the box around one view", "at most 2^30",
                           std::to_string(box.count()) + ": use larger voxels or a smaller maximum depth"));
-  scratch.cells.assign(size_t(box.count()), 0);
+  scratch.cells.assign(size_t(box.count()) + 1, 0);  // the spare cell takes what falls outside
 
   const double block_m = voxel_size_m * kBlockDim;
-  constexpr int kCoarsestStride = 4;
-  const double pixels_per_quarter_block = 0.25 * block_m * std::max(camera.fx, camera.fy) / farthest_m;
   const auto samples = size_t(std::ceil(2 * truncation_m / (0.5 * block_m))) + 1;
   scratch.offsets_m.resize(samples);
   for (size_t s = 0; s < samples; ++s)
     scratch.offsets_m[s] = float(truncation_m * (2.0 * double(s) / double(samples - 1) - 1));
 
   AllocationView view;
-  view.depth_m = depth_m.data();
-  view.width = depth_m.width(), view.height = depth_m.height();
-  view.stride = int(std::clamp(pixels_per_quarter_block, 1.0, double(kCoarsestStride)));
-  view.min_depth_m = min_depth_m, view.max_depth_m = max_depth_m;
   view.offsets_m = scratch.offsets_m.data();
   view.samples = int(samples);
   const Eigen::Vector3d ray0 = T_world_camera.linear() * camera.ray(0, 0) / block_m;
@@ -115,11 +163,16 @@ std::vector<BlockCoord> blocks_in_view(const DepthImage& depth_m, const PinholeC
     view.origin[c] = float((T_world_camera.translation()[c] / voxel_size_m + 0.5) / kBlockDim - box.lowest[c]);
     view.cells[c] = int(box.cells[c]);
   }
-  const int rows = (view.height + view.stride - 1) / view.stride;
-  tbb::parallel_for(tbb::blocked_range<int>(0, rows, 16), [&](const tbb::blocked_range<int>& range) {
-    for (int row = range.begin(); row < range.end(); ++row)
-      mark_cells_in_row(view, row * view.stride, scratch.cells.data());
+  const auto quarter_block_px = float(0.25 * block_m * std::max(camera.fx, camera.fy));  // at one metre
+  // Depth is marked while the survey has it at hand.
+  tbb::parallel_for(all_tile_rows, [&](const tbb::blocked_range<int>& range) {
+    for (int tile_row = range.begin(); tile_row < range.end(); ++tile_row) {
+      if (!fitted) survey(tile_row);
+      mark_tile_row(depth_m, min_depth_m, max_depth_m, finest.row(tile_row), finest.columns, tile_row, quarter_block_px,
+                    float(truncation_m), view, scratch.cells.data());
+    }
   });
+  spread_ranges(tiles);
   return marked_blocks(scratch.cells, box);
 }
 

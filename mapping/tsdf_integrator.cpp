@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 namespace felt {
 namespace {
@@ -45,6 +46,9 @@ const float* depth_scale(const Frame& frame, const IntegrationConfig& config, In
   return scratch.depth_scale.data();
 }
 
+/// Depth 0 means that nothing was measured, also where no least depth is asked for.
+float least_usable_m(float min_depth_m) { return std::max(min_depth_m, std::numeric_limits<float>::min()); }
+
 /// Finds or creates the blocks, with the planes that this frame writes: the only serial step.
 size_t allocate_blocks(Map& map, const std::vector<BlockCoord>& coords, bool with_color,
                        std::vector<uint32_t>& blocks) {
@@ -58,16 +62,19 @@ size_t allocate_blocks(Map& map, const std::vector<BlockCoord>& coords, bool wit
   return map.store.size() - before;
 }
 
-/// Planes of the next block travel while this one is projected.
-void prefetch(const GeometryPlanes& planes) {
-  const auto* bytes = reinterpret_cast<const char*>(&planes);
-  constexpr size_t kLine = 64;
-  for (size_t at = 0; at < sizeof planes; at += kLine) __builtin_prefetch(bytes + at, 1, 2);
+/// What the next block needs of its planes travels while this one is fused.
+void prefetch(const GeometryPlanes& planes, uint64_t cubes) {
+  for (uint32_t groups = groups_of_cubes(cubes); groups != 0; groups &= groups - 1) {
+    const int first = __builtin_ctz(groups) * kGroupVoxels;  // a group of floats is a cache line
+    __builtin_prefetch(planes.tsdf + first, 1, 2);
+    __builtin_prefetch(planes.weight + first, 1, 2);
+  }
 }
 
 }  // namespace
 
-DepthView depth_view(const Frame& frame, const IntegrationConfig& config, const Map& map, const float* scale) {
+DepthView depth_view(const Frame& frame, const IntegrationConfig& config, const Map& map, const float* scale,
+                     const DepthTiles* tiles) {
   DepthView view;
   view.depth_m = frame.depth_m.data();
   view.scale = scale;
@@ -85,7 +92,7 @@ DepthView depth_view(const Frame& frame, const IntegrationConfig& config, const 
     for (int y = 0; y < 8; ++y)
       for (int z = 0; z < 8; ++z) view.plane[c][y * 8 + z] = float(per_voxel(c, 1) * y + per_voxel(c, 2) * z);
   }
-  view.min_depth_m = config.min_depth_m, view.max_depth_m = config.max_depth_m;
+  view.min_depth_m = least_usable_m(config.min_depth_m), view.max_depth_m = config.max_depth_m;
   view.truncation_m = float(map.truncation_m);
   const double dropoff_start = std::min(double(config.dropoff_start_vox) * map.voxel_size_m, 0.99 * map.truncation_m);
   view.dropoff_start_m = float(dropoff_start);
@@ -93,6 +100,25 @@ DepthView depth_view(const Frame& frame, const IntegrationConfig& config, const 
   view.weight = config.weight;
   view.max_weight = config.max_weight;
   view.carve = config.carve;
+
+  view.tiles = tiles;
+  view.nearest_cube_m = std::numeric_limits<float>::infinity();
+  for (int cube = 0; cube < 64; ++cube) {
+    const Eigen::Vector3d centre(2 * (cube >> 4) + 0.5, 2 * (cube >> 2 & 3) + 0.5, 2 * (cube & 3) + 0.5);
+    for (int c = 0; c < 3; ++c) view.cube[c][cube] = float(per_voxel.row(c).dot(centre));
+    view.nearest_cube_m = std::min(view.nearest_cube_m, view.cube[2][cube]);
+  }
+  // A voxel is at centre + delta, |delta| <= 1/2 voxel an axis, and its pixel u' satisfies
+  // (u' - u) (z + delta . row 2) = delta . (row 0 - u row 2): largest in u at one end of where u is looked at.
+  view.reach_m = float(0.5 * per_voxel.row(2).cwiseAbs().sum());
+  const double margin = DepthTiles::kFinestTile << (DepthTiles::kLevels - 1);
+  for (const double u : {-margin, camera.width + margin})
+    view.reach_px_m =
+        std::max(view.reach_px_m, float(0.5 * (per_voxel.row(0) - u * per_voxel.row(2)).cwiseAbs().sum()));
+  for (const double v : {-margin, camera.height + margin})
+    view.reach_px_m =
+        std::max(view.reach_px_m, float(0.5 * (per_voxel.row(1) - v * per_voxel.row(2)).cwiseAbs().sum()));
+  view.band_m = view.truncation_m + view.reach_m + 1e-5f * (view.max_depth_m + view.truncation_m);
   return view;
 }
 
@@ -101,13 +127,16 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
   const auto start = Clock::now();
   const std::vector<BlockCoord> coords =
       blocks_in_view(frame.depth_m, frame.camera, frame.T_world_camera, map.voxel_size_m, map.truncation_m,
-                     config.min_depth_m, config.max_depth_m, scratch.allocation);
+                     least_usable_m(config.min_depth_m), config.max_depth_m, scratch.allocation);
   stats.blocks_created = allocate_blocks(map, coords, !frame.color.empty(), scratch.blocks);
   stats.blocks_in_view = coords.size();
   stats.allocate_s = seconds_since(start);
 
   const auto fusing = Clock::now();
-  const DepthView view = depth_view(frame, config, map, depth_scale(frame, config, scratch));
+  // Distance to the tangent plane is shorter than along the optical axis: a voxel far in front may be in the band.
+  const bool bounded = config.distance != DistanceModel::tangent_plane;
+  const DepthView view = depth_view(frame, config, map, depth_scale(frame, config, scratch),
+                                    bounded ? &scratch.allocation.tiles : nullptr);
   const auto* rgba = reinterpret_cast<const uint32_t*>(frame.color.data());
   const bool says_classes = !frame.labels.empty() || !frame.probabilities.empty();
   const double novelty =
@@ -121,10 +150,15 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
     BlockObservation observation;
     size_t observed = 0;
     LabelStats label_stats;
+    uint64_t next_cubes = cubes_in_band(coords[range.begin()], view);
     for (size_t n = range.begin(); n < range.end(); ++n) {
       Block& block = map.store[scratch.blocks[n]];
-      if (n + 1 < range.end()) prefetch(*map.store[scratch.blocks[n + 1]].geometry);
-      if (!observe_block(coords[n], view, observation)) continue;
+      const uint64_t cubes = next_cubes;
+      if (n + 1 < range.end()) {
+        next_cubes = cubes_in_band(coords[n + 1], view);
+        prefetch(*map.store[scratch.blocks[n + 1]].geometry, next_cubes);
+      }
+      if (cubes == 0 || !observe_block(coords[n], view, observation, cubes)) continue;
       ++observed;
       fuse_tsdf(observation, view.max_weight, *block.geometry);
       if (block.color != nullptr && rgba != nullptr) fuse_color(observation, rgba, view.truncation_m, *block.color);

@@ -35,7 +35,8 @@ struct IntegrationScratch {
 /// task) and for every SIMD target. Non-finite and out-of-range depth is ignored.
 FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& config, IntegrationScratch& scratch);
 
-/// The frame as the kernels see it. `scale` as in DepthView.
-DepthView depth_view(const Frame& frame, const IntegrationConfig& config, const Map& map, const float* scale);
+/// The frame as the kernels see it. `scale` and `tiles` as in DepthView.
+DepthView depth_view(const Frame& frame, const IntegrationConfig& config, const Map& map, const float* scale,
+                     const DepthTiles* tiles = nullptr);
 
 }  // namespace felt

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "mapping/block_store.h"
+#include "mapping/depth_tiles.h"
 #include "mapping/integration_config.h"
 
 namespace felt {
@@ -27,6 +28,14 @@ struct DepthView {
   WeightModel weight = WeightModel::constant;
   float max_weight = 0;
   bool carve = false;
+
+  // What `cubes_in_band` needs. A cube is 2^3 voxels; cube (x, y, z) of a block has the number x << 4 | y << 2 | z.
+  const DepthTiles* tiles = nullptr;   ///< null: every cube may be observed
+  alignas(64) float cube[3][64] = {};  ///< homogeneous pixel coordinates of cube centres, added to the first voxel's
+  float nearest_cube_m = 0;            ///< least of cube[2]
+  float reach_m = 0;                   ///< a cube's voxels lie within this of its centre along the optical axis,
+  float reach_px_m = 0;                ///< and within reach_px_m / (z - reach_m) pixels of it in the image
+  float band_m = 0;                    ///< truncation and reach_m, and what rounding may add
 };
 
 /// Homogeneous pixel coordinates of the block's first voxel: one definition, so that every target starts from the same
@@ -43,19 +52,53 @@ struct SensorNoise {
   static constexpr float kSigmaAtOneMetre = kFloor + kGrowth * ((1 - kOffset) * (1 - kOffset));
 };
 
+/// The voxels of a block that are handled together: 16 in a row of memory, (x, y, *) and (x, y + 1, *) with y even.
+inline constexpr int kGroupVoxels = 16;
+
 /// What one frame says about one block: filled by observe_block, read by every channel's fusion.
 struct alignas(64) BlockObservation {
   float sdf_m[kBlockVoxels];        ///< truncated; only where valid
   float weight[kBlockVoxels];       ///< only where valid
   int32_t pixel[kBlockVoxels];      ///< v * width + u; some pixel of the image where not valid
   uint8_t valid[kBlockVoxels / 8];  ///< bit z of byte x * 8 + y: the mask layout of an OpenVDB leaf
+  uint32_t groups;                  ///< bit g: some voxel of [16 g, 16 g + 16) is valid
 };
 
+inline constexpr uint64_t kAllCubes = ~uint64_t(0);
+
+/// Which cubes of the block the view may observe: where depth near a cube's place in the image comes close enough to
+/// its depth. A bit that is not set promises that `observe_block` finds no valid voxel there.
+uint64_t cubes_in_band(const BlockCoord& block, const DepthView& view) noexcept;
+uint64_t cubes_in_band_scalar(const BlockCoord& block, const DepthView& view) noexcept;
+
 /// Projects the block's voxels into the view. Returns whether any voxel is observed. Lanes that are not valid hold
-/// unspecified values. Every target gives the scalar version's bits: only +, -, *, / and comparisons, each rounded
-/// once.
-bool observe_block(const BlockCoord& block, const DepthView& view, BlockObservation& out) noexcept;
-bool observe_block_scalar(const BlockCoord& block, const DepthView& view, BlockObservation& out) noexcept;
+/// unspecified values. `cubes` from `cubes_in_band` saves looking at the others and changes nothing. Every target gives
+/// the scalar version's bits: only +, -, *, / and comparisons, each rounded once.
+bool observe_block(const BlockCoord& block, const DepthView& view, BlockObservation& out,
+                   uint64_t cubes = kAllCubes) noexcept;
+bool observe_block_scalar(const BlockCoord& block, const DepthView& view, BlockObservation& out,
+                          uint64_t cubes = kAllCubes) noexcept;
+
+/// The groups with a voxel of one of these cubes.
+inline uint32_t groups_of_cubes(uint64_t cubes) {
+  uint32_t groups = 0;
+  for (int x = 0; x < 8; x += 2) {  // a slice of 4 x 4 cubes holds two slices of four groups
+    uint32_t slice = uint32_t(cubes >> (8 * x)) & 0xffff;
+    slice |= slice >> 1, slice |= slice >> 2;
+    const uint32_t rows = (slice & 0x1111) * 0x1248 >> 12 & 0xf;  // bits 0, 4, 8, 12 side by side
+    groups |= (rows | rows << 4) << (4 * x);
+  }
+  return groups;
+}
+
+/// The level of `view.tiles` whose tiles are as large as the reach of a cube at depth `nearest_m` in the image, or null
+/// where none is, or the block reaches the camera.
+inline const DepthTiles::Level* tiles_for(const DepthView& view, float nearest_m) {
+  if (view.tiles == nullptr || !(nearest_m > 0)) return nullptr;
+  for (const DepthTiles::Level& level : view.tiles->levels)
+    if ((float(level.tile_px) - 0.5f) * nearest_m >= view.reach_px_m) return &level;
+  return nullptr;
+}
 
 /// Weighted running average (Curless and Levoy 1996): tsdf <- (W tsdf + w sdf) / (W + w), W <- min(W + w, max_weight).
 void fuse_tsdf(const BlockObservation& observation, float max_weight, GeometryPlanes& planes) noexcept;
@@ -68,24 +111,6 @@ inline constexpr int kMaxColorCount = 255;
 void fuse_color(const BlockObservation& observation, const uint32_t* rgba, float band_m, ColorPlanes& planes) noexcept;
 void fuse_color_scalar(const BlockObservation& observation, const uint32_t* rgba, float band_m,
                        ColorPlanes& planes) noexcept;
-
-/// Depth pixels as they mark blocks: q(u, v, d) = origin + d (ray0 + u ray_u + v ray_v) in units of blocks, relative to
-/// a box of cells. A cell is marked where a sample of [d - truncation, d + truncation] falls.
-struct AllocationView {
-  const float* depth_m = nullptr;
-  int width = 0, height = 0;
-  int stride = 1;  ///< every stride-th row and column
-  float min_depth_m = 0, max_depth_m = 0;
-  float origin[3] = {}, ray0[3] = {}, ray_u[3] = {}, ray_v[3] = {};
-  int cells[3] = {};                 ///< extent of the box
-  const float* offsets_m = nullptr;  ///< samples along the ray, relative to d
-  int samples = 0;
-};
-
-/// Marks cells (row-major x, y, z; one byte each) seen by image row `v`. Cells may be written by several rows at once:
-/// all write the same value.
-void mark_cells_in_row(const AllocationView& view, int v, uint8_t* cells) noexcept;
-void mark_cells_in_row_scalar(const AllocationView& view, int v, uint8_t* cells) noexcept;
 
 /// scale[v * width + u] = |n . r| of DistanceModel::tangent_plane for row v, from central differences of the depth:
 /// with slopes zu, zv per pixel, n is proportional to (-fx zu, -fy zv, z + fx zu rx + fy zv ry) and n . r to z. 0 where

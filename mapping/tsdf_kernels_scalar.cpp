@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstring>
 
@@ -24,45 +23,61 @@ float observation_weight(const DepthView& view, float d, float sdf) {
 
 }  // namespace
 
-bool observe_block_scalar(const BlockCoord& block, const DepthView& view, BlockObservation& out) noexcept {
+uint64_t cubes_in_band_scalar(const BlockCoord& block, const DepthView& view) noexcept {
   float base[3];
   block_base(block, view, base);
-  bool any = false;
-  for (int x = 0; x < 8; ++x) {
-    const float hu0 = base[0] + float(x) * view.step_x[0];
-    const float hv0 = base[1] + float(x) * view.step_x[1];
-    const float z0 = base[2] + float(x) * view.step_x[2];
-    for (int y = 0; y < 8; ++y) {
-      uint8_t bits = 0;
-      for (int zi = 0; zi < 8; ++zi) {
-        const int lane = y * 8 + zi, i = x * 64 + lane;
-        out.pixel[i] = 0;
-        const float z = z0 + view.plane[2][lane];
-        const float inverse_z = 1.0f / z;
-        const float u = (hu0 + view.plane[0][lane]) * inverse_z;
-        const float v = (hv0 + view.plane[1][lane]) * inverse_z;
-        if (!(z > 0 && u >= 0 && v >= 0 && u < float(view.width) && v < float(view.height))) continue;
-        const int32_t pixel = int32_t(v) * view.width + int32_t(u);
-        out.pixel[i] = pixel;
-        const float d = view.depth_m[pixel];
-        if (!(d >= view.min_depth_m && d <= view.max_depth_m)) continue;
-        float sdf = d - z;
-        if (view.scale != nullptr) {
-          const float scale = view.scale[pixel];
-          if (!(scale > 0)) continue;
-          sdf = sdf * scale;
-        }
-        if (!(sdf > -view.truncation_m)) continue;
-        if (!view.carve && !(sdf < view.truncation_m)) continue;
-        out.sdf_m[i] = std::min(sdf, view.truncation_m);
-        out.weight[i] = observation_weight(view, d, sdf);
-        bits |= uint8_t(1u << zi);
-      }
-      out.valid[x * 8 + y] = bits;
-      any |= bits != 0;
-    }
+  const DepthTiles::Level* level = tiles_for(view, base[2] + view.nearest_cube_m - view.reach_m);
+  if (level == nullptr) return kAllCubes;
+  const auto tile = float(level->tile_px), inverse_tile = 1.0f / tile;
+  uint64_t cubes = 0;
+  for (int cube = 0; cube < 64; ++cube) {
+    const float z = base[2] + view.cube[2][cube];
+    const float inverse_z = 1.0f / z;
+    const float u = (base[0] + view.cube[0][cube]) * inverse_z + tile;
+    const float v = (base[1] + view.cube[1][cube]) * inverse_z + tile;
+    if (!(u >= 0 && v >= 0 && u < float(view.width) + 2 * tile && v < float(view.height) + 2 * tile)) continue;
+    const DepthRange range =
+        level->around[size_t(v * inverse_tile) * size_t(level->around_stride()) + size_t(u * inverse_tile)];
+    if (range.minus_farthest_m + z < view.band_m && (view.carve || range.nearest_m - z < view.band_m))
+      cubes |= uint64_t(1) << cube;
   }
-  return any;
+  return cubes;
+}
+
+bool observe_block_scalar(const BlockCoord& block, const DepthView& view, BlockObservation& out,
+                          uint64_t cubes) noexcept {
+  float base[3];
+  block_base(block, view, base);
+  std::memset(out.valid, 0, sizeof out.valid);
+  out.groups = 0;
+  const uint32_t looked_at = groups_of_cubes(cubes);
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    const int x = i >> 6, lane = i & 63;
+    out.pixel[i] = 0;
+    if ((looked_at >> (i / kGroupVoxels) & 1) == 0) continue;
+    const float z = (base[2] + float(x) * view.step_x[2]) + view.plane[2][lane];
+    const float inverse_z = 1.0f / z;
+    const float u = ((base[0] + float(x) * view.step_x[0]) + view.plane[0][lane]) * inverse_z;
+    const float v = ((base[1] + float(x) * view.step_x[1]) + view.plane[1][lane]) * inverse_z;
+    if (!(z > 0 && u >= 0 && v >= 0 && u < float(view.width) && v < float(view.height))) continue;
+    const int32_t pixel = int32_t(v) * view.width + int32_t(u);
+    out.pixel[i] = pixel;
+    const float d = view.depth_m[pixel];
+    if (!(d >= view.min_depth_m && d <= view.max_depth_m)) continue;
+    float sdf = d - z;
+    if (view.scale != nullptr) {
+      const float scale = view.scale[pixel];
+      if (!(scale > 0)) continue;
+      sdf = sdf * scale;
+    }
+    if (!(sdf > -view.truncation_m)) continue;
+    if (!view.carve && !(sdf < view.truncation_m)) continue;
+    out.sdf_m[i] = std::min(sdf, view.truncation_m);
+    out.weight[i] = observation_weight(view, d, sdf);
+    out.valid[i >> 3] |= uint8_t(1u << (i & 7));
+    out.groups |= 1u << (i / kGroupVoxels);
+  }
+  return out.groups != 0;
 }
 
 void fuse_tsdf_scalar(const BlockObservation& observation, float max_weight, GeometryPlanes& planes) noexcept {
@@ -92,28 +107,6 @@ void fuse_color_scalar(const BlockObservation& observation, const uint32_t* rgba
     average(planes.g[i], pixel >> 8 & 0xff);
     average(planes.b[i], pixel >> 16 & 0xff);
     planes.count[i] = uint16_t(count);
-  }
-}
-
-void mark_cells_in_row_scalar(const AllocationView& view, int v, uint8_t* cells) noexcept {
-  const float* row = view.depth_m + size_t(v) * view.width;
-  for (int u = 0; u < view.width; u += view.stride) {
-    const float d = row[u];
-    if (!(d >= view.min_depth_m && d <= view.max_depth_m)) continue;
-    for (int s = 0; s < view.samples; ++s) {
-      const float along = d + view.offsets_m[s];
-      int32_t cell[3];
-      bool inside = true;
-      for (int c = 0; c < 3; ++c) {
-        const float direction = view.ray0[c] + float(v) * view.ray_v[c] + float(u) * view.ray_u[c];
-        const float q = view.origin[c] + along * direction;
-        inside = inside && q >= 0 && q < float(view.cells[c]);
-        cell[c] = inside ? int32_t(q) : 0;
-      }
-      if (!inside) continue;
-      uint8_t& mark = cells[(size_t(cell[0]) * view.cells[1] + cell[1]) * view.cells[2] + cell[2]];
-      std::atomic_ref<uint8_t>(mark).store(1, std::memory_order_relaxed);
-    }
   }
 }
 

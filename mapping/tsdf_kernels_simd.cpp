@@ -3,7 +3,6 @@
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
-#include <atomic>
 #include <cstring>
 
 #include "core/simd.h"
@@ -15,10 +14,18 @@ namespace felt {
 namespace {
 
 // Plain loads: x86 gather instructions take 2 to 4 times as long where microcode guards them against data sampling.
-// Compiled for the baseline target, so that no compiler turns the loop into a gather.
+// Compiled for the baseline target, so that no compiler turns the loops into gathers.
 template <typename T>
-[[gnu::noinline]] void fetch_pixels(const T* image, const int32_t* pixel, int count, T* out) {
-  for (int i = 0; i < count; ++i) out[i] = image[uint32_t(pixel[i])];
+[[gnu::noinline]] void fetch_pixels(const T* image, const int32_t* pixel, uint32_t groups, T* out) {
+  for (; groups != 0; groups &= groups - 1) {
+    const int first = __builtin_ctz(groups) * kGroupVoxels;
+    for (int i = first; i < first + kGroupVoxels; ++i) out[i] = image[uint32_t(pixel[i])];
+  }
+}
+
+// As the pairs of floats that they are: eight bytes a load.
+[[gnu::noinline]] void fetch_ranges(const DepthRange* ranges, const int32_t* tile, int count, DepthRange* out) {
+  for (int i = 0; i < count; ++i) std::memcpy(out + i, ranges + uint32_t(tile[i]), sizeof *out);
 }
 
 }  // namespace
@@ -63,15 +70,6 @@ HWY_INLINE FloatMask load_bits(const uint8_t* valid, int i) {
   return hn::LoadMaskBits(kF, bits);
 }
 
-HWY_INLINE bool any_bits(const uint8_t* valid, int i) {
-  if (hn::Lanes(kF) == 16) {
-    uint16_t two;
-    std::memcpy(&two, valid + i / 8, 2);
-    return two != 0;
-  }
-  return valid[i / 8] != 0;
-}
-
 template <WeightModel kModel>
 HWY_INLINE FloatVec observation_weight(FloatVec d) {
   const FloatVec one = hn::Set(kF, 1.0f);
@@ -86,8 +84,64 @@ HWY_INLINE FloatVec observation_weight(FloatVec d) {
   return one;
 }
 
+uint64_t cubes_in_band(const BlockCoord& block, const DepthView& view) {
+  float base[3];
+  block_base(block, view, base);
+  const DepthTiles::Level* level = tiles_for(view, base[2] + view.nearest_cube_m - view.reach_m);
+  if (level == nullptr) return kAllCubes;
+  const int lanes = int(hn::Lanes(kF));
+  const auto tile_px = float(level->tile_px);
+  const FloatVec zero = hn::Zero(kF), one = hn::Set(kF, 1.0f);
+  const FloatVec tile = hn::Set(kF, tile_px), inverse_tile = hn::Set(kF, 1.0f / tile_px);
+  const FloatVec right = hn::Set(kF, float(view.width) + 2 * tile_px);
+  const FloatVec bottom = hn::Set(kF, float(view.height) + 2 * tile_px);
+  const FloatVec hu0 = hn::Set(kF, base[0]), hv0 = hn::Set(kF, base[1]), z0 = hn::Set(kF, base[2]);
+  const FloatVec band = hn::Set(kF, view.band_m);
+  const auto columns = hn::Set(kI, level->around_stride());
+  alignas(64) float depth_m[64];
+  alignas(64) int32_t index[64];
+  alignas(64) DepthRange ranges[64];
+  alignas(64) int32_t pixels[64];
+  const auto row_length = hn::Set(kI, view.width);
+  uint8_t inside_bits[8 + 8], band_bits[8 + 8];  // eight bytes more because some targets write that many
+  for (int i = 0; i < 64; i += lanes) {
+    const FloatVec z = hn::Add(z0, hn::Load(kF, view.cube[2] + i));
+    const FloatVec inverse_z = hn::Div(one, z);
+    const FloatVec u = hn::Add(hn::Mul(hn::Add(hu0, hn::Load(kF, view.cube[0] + i)), inverse_z), tile);
+    const FloatVec v = hn::Add(hn::Mul(hn::Add(hv0, hn::Load(kF, view.cube[1] + i)), inverse_z), tile);
+    const FloatMask inside =
+        hn::And(hn::And(hn::Ge(u, zero), hn::Ge(v, zero)), hn::And(hn::Lt(u, right), hn::Lt(v, bottom)));
+    const auto at = hn::Add(hn::Mul(hn::ConvertTo(kI, hn::Mul(v, inverse_tile)), columns),
+                            hn::ConvertTo(kI, hn::Mul(u, inverse_tile)));
+    hn::Store(hn::IfThenElseZero(hn::RebindMask(kI, inside), at), kI, index + i);
+    hn::Store(hn::Add(hn::Mul(hn::ConvertTo(kI, hn::Sub(v, tile)), row_length), hn::ConvertTo(kI, hn::Sub(u, tile))),
+              kI, pixels + i);
+    hn::Store(z, kF, depth_m + i);
+    store_bits(inside, i, inside_bits);
+  }
+  fetch_ranges(level->around.data(), index, 64, ranges);
+  for (int i = 0; i < 64; i += lanes) {
+    FloatVec nearest, minus_farthest;
+    hn::LoadInterleaved2(kF, &ranges[i].nearest_m, nearest, minus_farthest);
+    const FloatVec z = hn::Load(kF, depth_m + i);
+    FloatMask near = hn::Lt(hn::Add(minus_farthest, z), band);
+    if (!view.carve) near = hn::And(near, hn::Lt(hn::Sub(nearest, z), band));
+    store_bits(hn::And(near, load_bits(inside_bits, i)), i, band_bits);
+  }
+  uint64_t cubes;
+  std::memcpy(&cubes, band_bits, sizeof cubes);
+  // The depth that these cubes' voxels will read travels meanwhile: two rows of the image, above and below the centre.
+  const int half_px = int(0.5f * view.reach_px_m / (base[2] + view.cube[2][32]));
+  for (uint64_t rest = cubes; rest != 0; rest &= rest - 1) {
+    const intptr_t pixel = pixels[__builtin_ctzll(rest)];
+    for (const intptr_t at : {pixel - half_px * view.width, pixel + half_px * view.width})
+      __builtin_prefetch(reinterpret_cast<const void*>(reinterpret_cast<intptr_t>(view.depth_m) + 4 * at), 0, 3);
+  }
+  return cubes;
+}
+
 template <bool kScaled, WeightModel kModel>
-bool observe(const BlockCoord& block, const DepthView& view, BlockObservation& out) {
+bool observe(const BlockCoord& block, const DepthView& view, BlockObservation& out, uint64_t cubes) {
   float base[3];
   block_base(block, view, base);
   const int lanes = int(hn::Lanes(kF));
@@ -99,15 +153,18 @@ bool observe(const BlockCoord& block, const DepthView& view, BlockObservation& o
   // Carving takes free space at any distance in front.
   const FloatVec sdf_limit = hn::Set(kF, view.carve ? HWY_MAX(view.max_depth_m, 1.0f) * 1e6f : view.truncation_m);
   const FloatVec dropoff_start = hn::Set(kF, -view.dropoff_start_m), dropoff_slope = hn::Set(kF, view.dropoff_slope);
-  // Where each voxel falls. Voxels outside the image take pixel 0, so that reading depth needs no test.
-  bool in_view = false;
   std::memset(out.valid, 0, sizeof out.valid);
-  for (int x = 0; x < 8; ++x) {
+  out.groups = 0;
+  // Where each voxel falls. Voxels outside the image take pixel 0, so that reading depth needs no test.
+  uint32_t in_view = 0;
+  for (uint32_t rest = groups_of_cubes(cubes); rest != 0; rest &= rest - 1) {
+    const int group = __builtin_ctz(rest), x = group >> 2;
     const FloatVec hu0 = hn::Set(kF, base[0] + float(x) * view.step_x[0]);
     const FloatVec hv0 = hn::Set(kF, base[1] + float(x) * view.step_x[1]);
     const FloatVec z0 = hn::Set(kF, base[2] + float(x) * view.step_x[2]);
-    for (int lane = 0; lane < 64; lane += lanes) {
-      const int i = x * 64 + lane;
+    bool any = false;
+    for (int i = group * kGroupVoxels; i < (group + 1) * kGroupVoxels; i += lanes) {
+      const int lane = i & 63;
       const FloatVec z = hn::Add(z0, hn::Load(kF, view.plane[2] + lane));
       const FloatVec inverse_z = hn::Div(one, z);
       const FloatVec u = hn::Mul(hn::Add(hu0, hn::Load(kF, view.plane[0] + lane)), inverse_z);
@@ -115,67 +172,74 @@ bool observe(const BlockCoord& block, const DepthView& view, BlockObservation& o
       const FloatMask inside = hn::And(hn::And(hn::Gt(z, zero), hn::And(hn::Ge(u, zero), hn::Ge(v, zero))),
                                        hn::And(hn::Lt(u, width), hn::Lt(v, height)));
       const auto index = hn::Add(hn::Mul(hn::ConvertTo(kI, v), row_length), hn::ConvertTo(kI, u));
-      in_view = in_view || !hn::AllFalse(kF, inside);
+      any = any || !hn::AllFalse(kF, inside);
       store_bits(inside, i, out.valid);
       hn::Store(z, kF, out.sdf_m + i);
       hn::Store(hn::IfThenElseZero(hn::RebindMask(kI, inside), index), kI, out.pixel + i);
     }
+    in_view |= uint32_t(any) << group;
   }
-  if (!in_view) return false;
+  if (in_view == 0) return false;
   alignas(64) float depth_m[kBlockVoxels];
   alignas(64) float scales[kScaled ? kBlockVoxels : 1];
-  fetch_pixels(view.depth_m, out.pixel, kBlockVoxels, depth_m);
-  if constexpr (kScaled) fetch_pixels(view.scale, out.pixel, kBlockVoxels, scales);
+  fetch_pixels(view.depth_m, out.pixel, in_view, depth_m);
+  if constexpr (kScaled) fetch_pixels(view.scale, out.pixel, in_view, scales);
 
-  bool any = false;
-  for (int i = 0; i < kBlockVoxels; i += lanes) {
-    const FloatVec d = hn::Load(kF, depth_m + i);
-    FloatVec sdf = hn::Sub(d, hn::Load(kF, out.sdf_m + i));
-    FloatMask valid = hn::And(load_bits(out.valid, i), hn::And(hn::Ge(d, nearest), hn::Le(d, farthest)));
-    if constexpr (kScaled) {
-      const FloatVec scale = hn::Load(kF, scales + i);
-      valid = hn::And(valid, hn::Gt(scale, zero));
-      sdf = hn::Mul(sdf, scale);
+  for (uint32_t rest = in_view; rest != 0; rest &= rest - 1) {
+    const int group = __builtin_ctz(rest);
+    bool any = false;
+    for (int i = group * kGroupVoxels; i < (group + 1) * kGroupVoxels; i += lanes) {
+      const FloatVec d = hn::Load(kF, depth_m + i);
+      FloatVec sdf = hn::Sub(d, hn::Load(kF, out.sdf_m + i));
+      FloatMask valid = hn::And(load_bits(out.valid, i), hn::And(hn::Ge(d, nearest), hn::Le(d, farthest)));
+      if constexpr (kScaled) {
+        const FloatVec scale = hn::Load(kF, scales + i);
+        valid = hn::And(valid, hn::Gt(scale, zero));
+        sdf = hn::Mul(sdf, scale);
+      }
+      valid = hn::And(valid, hn::And(hn::Gt(sdf, minus_truncation), hn::Lt(sdf, sdf_limit)));
+      store_bits(valid, i, out.valid);
+      any = any || !hn::AllFalse(kF, valid);
+      FloatVec weight = observation_weight<kModel>(d);
+      const FloatVec falling = hn::Mul(weight, hn::Mul(hn::Add(sdf, truncation), dropoff_slope));
+      weight = hn::IfThenElse(hn::Lt(sdf, dropoff_start), falling, weight);
+      hn::Store(hn::Min(sdf, truncation), kF, out.sdf_m + i);
+      hn::Store(weight, kF, out.weight + i);
     }
-    valid = hn::And(valid, hn::And(hn::Gt(sdf, minus_truncation), hn::Lt(sdf, sdf_limit)));
-    store_bits(valid, i, out.valid);
-    if (hn::AllFalse(kF, valid)) continue;
-    any = true;
-    FloatVec weight = observation_weight<kModel>(d);
-    const FloatVec falling = hn::Mul(weight, hn::Mul(hn::Add(sdf, truncation), dropoff_slope));
-    weight = hn::IfThenElse(hn::Lt(sdf, dropoff_start), falling, weight);
-    hn::Store(hn::Min(sdf, truncation), kF, out.sdf_m + i);
-    hn::Store(weight, kF, out.weight + i);
+    out.groups |= uint32_t(any) << group;
   }
-  return any;
+  return out.groups != 0;
 }
 
 template <bool kScaled>
-bool observe_weighted(const BlockCoord& block, const DepthView& view, BlockObservation& out) {
+bool observe_weighted(const BlockCoord& block, const DepthView& view, BlockObservation& out, uint64_t cubes) {
   switch (view.weight) {
     case WeightModel::inverse_square:
-      return observe<kScaled, WeightModel::inverse_square>(block, view, out);
+      return observe<kScaled, WeightModel::inverse_square>(block, view, out, cubes);
     case WeightModel::sensor_noise:
-      return observe<kScaled, WeightModel::sensor_noise>(block, view, out);
+      return observe<kScaled, WeightModel::sensor_noise>(block, view, out, cubes);
     default:
-      return observe<kScaled, WeightModel::constant>(block, view, out);
+      return observe<kScaled, WeightModel::constant>(block, view, out, cubes);
   }
 }
 
-bool observe_block(const BlockCoord& block, const DepthView& view, BlockObservation& out) {
-  return view.scale != nullptr ? observe_weighted<true>(block, view, out) : observe_weighted<false>(block, view, out);
+bool observe_block(const BlockCoord& block, const DepthView& view, BlockObservation& out, uint64_t cubes) {
+  return view.scale != nullptr ? observe_weighted<true>(block, view, out, cubes)
+                               : observe_weighted<false>(block, view, out, cubes);
 }
 
 void fuse_tsdf(const BlockObservation& observation, float max_weight, GeometryPlanes& planes) {
   const FloatVec cap = hn::Set(kF, max_weight);
-  for (int i = 0; i < kBlockVoxels; i += int(hn::Lanes(kF))) {
-    if (!any_bits(observation.valid, i)) continue;
-    const FloatMask valid = load_bits(observation.valid, i);
-    const FloatVec W = hn::Load(kF, planes.weight + i), w = hn::Load(kF, observation.weight + i);
-    const FloatVec sum = hn::Add(W, w), old = hn::Load(kF, planes.tsdf + i);
-    const FloatVec fresh = hn::Div(hn::Add(hn::Mul(old, W), hn::Mul(hn::Load(kF, observation.sdf_m + i), w)), sum);
-    hn::Store(hn::IfThenElse(valid, fresh, old), kF, planes.tsdf + i);
-    hn::Store(hn::IfThenElse(valid, hn::Min(sum, cap), W), kF, planes.weight + i);
+  for (uint32_t rest = observation.groups; rest != 0; rest &= rest - 1) {
+    const int first = __builtin_ctz(rest) * kGroupVoxels;
+    for (int i = first; i < first + kGroupVoxels; i += int(hn::Lanes(kF))) {
+      const FloatMask valid = load_bits(observation.valid, i);
+      const FloatVec W = hn::Load(kF, planes.weight + i), w = hn::Load(kF, observation.weight + i);
+      const FloatVec sum = hn::Add(W, w), old = hn::Load(kF, planes.tsdf + i);
+      const FloatVec fresh = hn::Div(hn::Add(hn::Mul(old, W), hn::Mul(hn::Load(kF, observation.sdf_m + i), w)), sum);
+      hn::Store(hn::IfThenElse(valid, fresh, old), kF, planes.tsdf + i);
+      hn::Store(hn::IfThenElse(valid, hn::Min(sum, cap), W), kF, planes.weight + i);
+    }
   }
 }
 
@@ -193,66 +257,24 @@ void fuse_color(const BlockObservation& observation, const uint32_t* rgba, float
   const int lanes = int(hn::Lanes(kF));
   // First fetch, then average: a vector load right behind the stores it depends on would stall.
   alignas(64) int32_t pixels[kBlockVoxels];
-  int todo[kBlockVoxels], count_todo = 0;
-  for (int i = 0; i < kBlockVoxels; i += lanes) {
-    if (!any_bits(observation.valid, i)) continue;
-    fetch_pixels(reinterpret_cast<const int32_t*>(rgba), observation.pixel + i, lanes, pixels + i);
-    todo[count_todo++] = i;
-  }
-  for (int n = 0; n < count_todo; ++n) {
-    const int i = todo[n];
-    const auto pixel = hn::Load(kI, pixels + i);
-    // Alpha is the high byte; the shift keeps its sign, which does not matter for the comparison with 0.
-    const FloatMask colored = hn::RebindMask(kF, hn::Ne(hn::ShiftRight<24>(pixel), hn::Zero(kI)));
-    const FloatMask near = hn::Lt(hn::Abs(hn::Load(kF, observation.sdf_m + i)), band);
-    const FloatMask take = hn::And(load_bits(observation.valid, i), hn::And(near, colored));
-    if (hn::AllFalse(kF, take)) continue;
-    const FloatVec old_count = hn::ConvertTo(kF, hn::PromoteTo(kI, hn::Load(kU16, planes.count + i)));
-    const FloatVec count = hn::Min(hn::Add(old_count, one), top);
-    const FloatVec share = hn::Div(one, count);
-    average_color(take, hn::ConvertTo(kF, hn::And(pixel, byte_mask)), share, planes.r + i);
-    average_color(take, hn::ConvertTo(kF, hn::And(hn::ShiftRight<8>(pixel), byte_mask)), share, planes.g + i);
-    average_color(take, hn::ConvertTo(kF, hn::And(hn::ShiftRight<16>(pixel), byte_mask)), share, planes.b + i);
-    const FloatVec kept = hn::IfThenElse(take, count, old_count);
-    hn::Store(hn::DemoteTo(kU16, hn::ConvertTo(kI, kept)), kU16, planes.count + i);
-  }
-}
-
-void mark_cells_in_row(const AllocationView& view, int v, uint8_t* cells) {
-  const int lanes = int(hn::Lanes(kF));
-  const float* row = view.depth_m + size_t(v) * view.width;
-  const FloatVec zero = hn::Zero(kF);
-  const FloatVec nearest = hn::Set(kF, view.min_depth_m), farthest = hn::Set(kF, view.max_depth_m);
-  const auto width = hn::Set(kI, view.width);
-  alignas(64) int32_t index[16];
-  alignas(64) float sampled_m[16];
-  for (int u0 = 0; u0 < view.width; u0 += lanes * view.stride) {
-    const auto u = hn::Add(hn::Mul(hn::Iota(kI, 0), hn::Set(kI, view.stride)), hn::Set(kI, u0));
-    const auto in_row = hn::RebindMask(kF, hn::Lt(u, width));
-    for (int lane = 0; lane < lanes; ++lane) sampled_m[lane] = row[HWY_MIN(u0 + lane * view.stride, view.width - 1)];
-    const FloatVec d = hn::Load(kF, sampled_m);
-    const FloatMask usable = hn::And(in_row, hn::And(hn::Ge(d, nearest), hn::Le(d, farthest)));
-    if (hn::AllFalse(kF, usable)) continue;
-    const FloatVec uf = hn::ConvertTo(kF, u);
-    FloatVec direction[3];
-    for (int c = 0; c < 3; ++c)
-      direction[c] =
-          hn::Add(hn::Set(kF, view.ray0[c] + float(v) * view.ray_v[c]), hn::Mul(uf, hn::Set(kF, view.ray_u[c])));
-    for (int s = 0; s < view.samples; ++s) {
-      const FloatVec along = hn::Add(d, hn::Set(kF, view.offsets_m[s]));
-      FloatMask inside = usable;
-      auto cell = hn::Zero(kI);
-      for (int c = 0; c < 3; ++c) {
-        const FloatVec q = hn::Add(hn::Set(kF, view.origin[c]), hn::Mul(along, direction[c]));
-        inside = hn::And(inside, hn::And(hn::Ge(q, zero), hn::Lt(q, hn::Set(kF, float(view.cells[c])))));
-        cell = hn::Add(hn::Mul(cell, hn::Set(kI, view.cells[c])), hn::ConvertTo(kI, q));
-      }
-      hn::Store(cell, kI, index);
-      uint8_t bits[8] = {};
-      hn::StoreMaskBits(kF, inside, bits);
-      uint32_t set = uint32_t(bits[0]) | uint32_t(bits[1]) << 8;
-      for (; set != 0; set &= set - 1)
-        std::atomic_ref<uint8_t>(cells[index[__builtin_ctz(set)]]).store(1, std::memory_order_relaxed);
+  fetch_pixels(reinterpret_cast<const int32_t*>(rgba), observation.pixel, observation.groups, pixels);
+  for (uint32_t rest = observation.groups; rest != 0; rest &= rest - 1) {
+    const int first = __builtin_ctz(rest) * kGroupVoxels;
+    for (int i = first; i < first + kGroupVoxels; i += lanes) {
+      const auto pixel = hn::Load(kI, pixels + i);
+      // Alpha is the high byte; the shift keeps its sign, which does not matter for the comparison with 0.
+      const FloatMask colored = hn::RebindMask(kF, hn::Ne(hn::ShiftRight<24>(pixel), hn::Zero(kI)));
+      const FloatMask near = hn::Lt(hn::Abs(hn::Load(kF, observation.sdf_m + i)), band);
+      const FloatMask take = hn::And(load_bits(observation.valid, i), hn::And(near, colored));
+      if (hn::AllFalse(kF, take)) continue;
+      const FloatVec old_count = hn::ConvertTo(kF, hn::PromoteTo(kI, hn::Load(kU16, planes.count + i)));
+      const FloatVec count = hn::Min(hn::Add(old_count, one), top);
+      const FloatVec share = hn::Div(one, count);
+      average_color(take, hn::ConvertTo(kF, hn::And(pixel, byte_mask)), share, planes.r + i);
+      average_color(take, hn::ConvertTo(kF, hn::And(hn::ShiftRight<8>(pixel), byte_mask)), share, planes.g + i);
+      average_color(take, hn::ConvertTo(kF, hn::And(hn::ShiftRight<16>(pixel), byte_mask)), share, planes.b + i);
+      const FloatVec kept = hn::IfThenElse(take, count, old_count);
+      hn::Store(hn::DemoteTo(kU16, hn::ConvertTo(kI, kept)), kU16, planes.count + i);
     }
   }
 }
@@ -300,15 +322,19 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace felt {
 
+HWY_EXPORT(cubes_in_band);
 HWY_EXPORT(observe_block);
 HWY_EXPORT(fuse_tsdf);
 HWY_EXPORT(fuse_color);
-HWY_EXPORT(mark_cells_in_row);
 HWY_EXPORT(tangent_scale_row);
 
-bool observe_block(const BlockCoord& block, const DepthView& view, BlockObservation& out) noexcept {
-  return simd_scalar_forced() ? observe_block_scalar(block, view, out)
-                              : HWY_DYNAMIC_DISPATCH(observe_block)(block, view, out);
+uint64_t cubes_in_band(const BlockCoord& block, const DepthView& view) noexcept {
+  return simd_scalar_forced() ? cubes_in_band_scalar(block, view) : HWY_DYNAMIC_DISPATCH(cubes_in_band)(block, view);
+}
+
+bool observe_block(const BlockCoord& block, const DepthView& view, BlockObservation& out, uint64_t cubes) noexcept {
+  return simd_scalar_forced() ? observe_block_scalar(block, view, out, cubes)
+                              : HWY_DYNAMIC_DISPATCH(observe_block)(block, view, out, cubes);
 }
 
 void fuse_tsdf(const BlockObservation& observation, float max_weight, GeometryPlanes& planes) noexcept {
@@ -319,11 +345,6 @@ void fuse_tsdf(const BlockObservation& observation, float max_weight, GeometryPl
 void fuse_color(const BlockObservation& observation, const uint32_t* rgba, float band_m, ColorPlanes& planes) noexcept {
   if (simd_scalar_forced()) return fuse_color_scalar(observation, rgba, band_m, planes);
   HWY_DYNAMIC_DISPATCH(fuse_color)(observation, rgba, band_m, planes);
-}
-
-void mark_cells_in_row(const AllocationView& view, int v, uint8_t* cells) noexcept {
-  if (simd_scalar_forced()) return mark_cells_in_row_scalar(view, v, cells);
-  HWY_DYNAMIC_DISPATCH(mark_cells_in_row)(view, v, cells);
 }
 
 void tangent_scale_row(const SlopeView& view, int v, float* scale_row) noexcept {

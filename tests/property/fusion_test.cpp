@@ -1,12 +1,14 @@
 #include <tbb/global_control.h>
 
 #include <hwy/targets.h>
+#include <bit>
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <limits>
 #include <map>
 #include <set>
 
+#include "mapping/survey_kernels.h"
 #include "mapping/tsdf_integrator.h"
 #include "tests/support/views.h"
 
@@ -93,35 +95,49 @@ TEST_CASE("every SIMD target fuses the scalar version's bits") {
   }
 }
 
-TEST_CASE("every SIMD target marks the scalar version's cells and slopes") {
+TEST_CASE("every SIMD target marks the scalar version's cells, slopes and ranges of depth") {
   Random random(3);
   Frame frame = ball_before_wall(jittered_pose(random), 161, 119);
   corrupt(frame.depth_m, random);
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
     const float offsets[] = {-0.08f, 0, 0.08f};
-    for (const int stride : {1, 2, 3, 4}) {
-      AllocationView view{.depth_m = frame.depth_m.data(),
-                          .width = 161,
-                          .height = 119,
-                          .stride = stride,
-                          .min_depth_m = 0.1f,
-                          .max_depth_m = 4,
-                          .origin = {8, 8, 1},
-                          .ray0 = {-3, -2, 6},
-                          .ray_u = {.04f, 0, 0},
-                          .ray_v = {0, .04f, 0},
-                          .cells = {16, 14, 13},
-                          .offsets_m = offsets,
-                          .samples = 3};
-      std::vector<uint8_t> expected(16 * 14 * 13), found(expected.size());
-      for (int v = 0; v < 119; ++v) {
-        mark_cells_in_row_scalar(view, v, expected.data());
-        mark_cells_in_row(view, v, found.data());
+    const AllocationView view{.origin = {8, 8, 1},
+                              .ray0 = {-3, -2, 6},
+                              .ray_u = {.04f, 0, 0},
+                              .ray_v = {0, .04f, 0},
+                              .cells = {16, 14, 13},
+                              .offsets_m = offsets,
+                              .samples = 3};
+    constexpr size_t kCells = 16 * 14 * 13;
+    std::vector<uint8_t> marked(kCells + 1), marked_scalar(kCells + 1);
+    for (int v = 0; v < 119; ++v) {
+      RowSamples row;
+      row.count = v % 41;
+      for (int i = 0; i < row.count; ++i) {
+        row.u[i] = float(int(random() * 161));
+        row.depth_m[i] = frame.depth_m(int(row.u[i]), v);
+        if (!(row.depth_m[i] > 0 && row.depth_m[i] < 4)) row.depth_m[i] = 1;
       }
-      REQUIRE(found == expected);
-      REQUIRE(std::count(found.begin(), found.end(), 1) > 20);
+      mark_cells_scalar(view, v, row, marked_scalar.data());
+      mark_cells(view, v, row, marked.data());
     }
+    marked.back() = marked_scalar.back();  // the spare cell is nobody's
+    REQUIRE(marked == marked_scalar);
+    REQUIRE(std::count(marked.begin(), marked.end(), 1) > 20);
+
+    constexpr int kColumns = 21, kRows = 15;
+    std::vector<DepthRange> ranges(kColumns * kRows), ranges_scalar(kColumns * kRows);
+    for (int row = 0; row < kRows; ++row) {
+      tile_range_row_scalar(frame.depth_m.data(), 161, 119, row, 0.1f, 4, &ranges_scalar[row * kColumns]);
+      tile_range_row(frame.depth_m.data(), 161, 119, row, 0.1f, 4, &ranges[row * kColumns]);
+    }
+    REQUIRE(std::memcmp(ranges.data(), ranges_scalar.data(), ranges.size() * sizeof ranges[0]) == 0);
+    std::vector<DepthRange> spread(kColumns - 2), spread_scalar(kColumns - 2);
+    spread_range_row_scalar(ranges.data(), kColumns, spread_scalar.data(), kColumns - 2);
+    spread_range_row(ranges.data(), kColumns, spread.data(), kColumns - 2);
+    REQUIRE(std::memcmp(spread.data(), spread_scalar.data(), spread.size() * sizeof spread[0]) == 0);
+
     const SlopeView slopes{.depth_m = frame.depth_m.data(),
                            .width = 161,
                            .height = 119,
@@ -139,6 +155,52 @@ TEST_CASE("every SIMD target marks the scalar version's cells and slopes") {
     }
   }
   hwy::SetSupportedTargetsForTest(0);
+}
+
+TEST_CASE("cubes out of the band hold no observed voxel, on every SIMD target") {
+  Random random(11);
+  size_t dropped = 0, observed = 0;
+  for (int variant = 0; variant < 6; ++variant) {
+    IntegrationConfig config;
+    config.carve = variant == 5;
+    const bool small = variant % 2 == 1;
+    Frame frame = ball_before_wall(jittered_pose(random), small ? 97 : 320, small ? 61 : 240);
+    corrupt(frame.depth_m, random);
+    const double voxel_m = variant < 2 ? 0.01 : variant < 4 ? 0.02 : 0.05;
+    Map map(voxel_m, 4 * voxel_m);
+    AllocationScratch scratch;
+    blocks_in_view(frame.depth_m, frame.camera, frame.T_world_camera, voxel_m, map.truncation_m, config.min_depth_m,
+                   config.max_depth_m, scratch);
+    const DepthView view = depth_view(frame, config, map, nullptr, &scratch.tiles);
+    const double reach = 0.5 / (voxel_m * kBlockDim);
+    for (int block = 0; block < 1000; ++block) {
+      // In front of the camera, beside it and around it.
+      const BlockCoord coord{int(random.between(-2, 2) * reach), int(random.between(-2, 2) * reach),
+                             int(random.between(-1, 5) * reach)};
+      const uint64_t cubes = cubes_in_band_scalar(coord, view);
+      BlockObservation all, some;
+      observe_block_scalar(coord, view, all);
+      const bool any = observe_block_scalar(coord, view, some, cubes);
+      REQUIRE(std::memcmp(all.valid, some.valid, sizeof all.valid) == 0);
+      for (int i = 0; i < kBlockVoxels; ++i) {
+        if ((all.valid[i >> 3] >> (i & 7) & 1) == 0) continue;
+        const Index3 at = voxel_of_offset(i);
+        REQUIRE((cubes >> (at.x / 2 << 4 | at.y / 2 << 2 | at.z / 2) & 1) == 1);
+        ++observed;
+      }
+      dropped += size_t(64 - std::popcount(cubes));
+      for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+        hwy::SetSupportedTargetsForTest(target);
+        REQUIRE(cubes_in_band(coord, view) == cubes);
+        BlockObservation found;
+        REQUIRE(observe_block(coord, view, found, cubes) == any);
+        REQUIRE(std::memcmp(found.valid, some.valid, sizeof some.valid) == 0);
+      }
+      hwy::SetSupportedTargetsForTest(0);
+    }
+  }
+  CHECK(observed > 50000);
+  CHECK(dropped > 6 * 1000 * 64 / 2);  // they are worth asking for
 }
 
 TEST_CASE("the map does not depend on the number of threads") {
@@ -238,6 +300,10 @@ TEST_CASE("frames without a usable pixel leave the map as it is") {
   Map map(0.02, 0.08);
   IntegrationScratch scratch;
   Frame frame = ball_before_wall(Eigen::Isometry3d::Identity());
+  std::fill(frame.depth_m.begin(), frame.depth_m.end(), 0.0f);
+  IntegrationConfig from_the_lens;
+  from_the_lens.min_depth_m = 0;  // depth 0 still means that nothing was measured
+  CHECK(integrate(map, frame, from_the_lens, scratch).blocks_in_view == 0);
   for (const float bad : {0.0f, -1.0f, 100.0f, std::numeric_limits<float>::quiet_NaN(),
                           std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()}) {
     std::fill(frame.depth_m.begin(), frame.depth_m.end(), bad);
