@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <span>
@@ -80,29 +81,30 @@ int stride_in_tile(const DepthRange& tile, float quarter_block_px, float truncat
 void mark_tile_row(const DepthImage& depth_m, float min_depth_m, float max_depth_m, const DepthRange* tiles,
                    int columns, int tile_row, float quarter_block_px, float truncation_m, const AllocationView& view,
                    uint8_t* cells) {
-  constexpr int kTile = DepthTiles::kFinestTile;
-  std::array<uint8_t, RowSamples::kMost / kTile> strides;
+  constexpr int kTile = DepthTiles::kFinestTile, kAtOnce = RowSamples::kMost / kTile, kStrides = 4;
+  std::array<int, kAtOnce> columns_of[kStrides];  // by logarithm of the stride
   RowSamples samples;
-  for (int first = 0; first < columns; first += int(strides.size())) {
-    const int count = std::min(columns - first, int(strides.size()));
-    for (int c = 0; c < count; ++c) {
-      const DepthRange& tile = tiles[first + c];
-      const bool empty = tile.nearest_m > max_depth_m;
-      strides[size_t(c)] = empty ? 0 : uint8_t(stride_in_tile(tile, quarter_block_px, truncation_m));
+  for (int first = 0; first < columns; first += kAtOnce) {
+    int count[kStrides] = {};
+    for (int c = first; c < std::min(columns, first + kAtOnce); ++c) {
+      if (tiles[c].nearest_m > max_depth_m) continue;
+      const int log = std::countr_zero(unsigned(stride_in_tile(tiles[c], quarter_block_px, truncation_m)));
+      columns_of[log][size_t(count[log]++)] = c;
     }
-    for (int y = 0; y < kTile; ++y) {
+    for (int y = 0; y < std::min(kTile, depth_m.height() - tile_row * kTile); ++y) {
       const int v = tile_row * kTile + y;
-      if (v >= depth_m.height()) break;
       const float* row = depth_m.row(v);
       samples.count = 0;
-      for (int c = 0; c < count; ++c) {
-        const int stride = strides[size_t(c)];
-        if (stride == 0 || y % stride != stride / 2) continue;
-        const int begin = (first + c) * kTile, end = std::min(depth_m.width(), begin + kTile);
-        for (int u = begin + stride / 2; u < end; u += stride) {
-          samples.u[samples.count] = float(u);
-          samples.depth_m[samples.count] = row[u];
-          samples.count += row[u] >= min_depth_m && row[u] <= max_depth_m;
+      for (int log = 0; log < kStrides; ++log) {
+        const int stride = 1 << log;
+        if ((y & (stride - 1)) != stride / 2) continue;  // rows and columns begin half a stride within the tile
+        for (int n = 0; n < count[log]; ++n) {
+          const int begin = columns_of[log][size_t(n)] * kTile, end = std::min(depth_m.width(), begin + kTile);
+          for (int u = begin + stride / 2; u < end; u += stride) {
+            samples.u[samples.count] = float(u);
+            samples.depth_m[samples.count] = row[u];
+            samples.count += row[u] >= min_depth_m && row[u] <= max_depth_m;
+          }
         }
       }
       mark_cells(view, v, samples, cells);
