@@ -48,7 +48,7 @@ std::vector<uint16_t> translation(const ClassTable& from, const ClassTable& to) 
 struct Learned {
   ConfusionCounts even, odd;  ///< of every other frame
   int64_t frames = 0;
-  std::map<std::string, int64_t> skipped;
+  std::map<std::string, int64_t> skipped = {};
 };
 
 Learned learn(const CalibrateOptions& o, const SequenceReader& predicted, const SequenceReader& reference) {

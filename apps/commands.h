@@ -8,8 +8,10 @@ namespace felt::apps {
 
 // Each adds one subcommand; it lives in apps/<command>.cpp and is called from apps/main.cpp, in the order of `--help`.
 void add_reconstruct(CLI::App& app);
+void add_doctor(CLI::App& app);
 void add_segment(CLI::App& app);
 void add_info(CLI::App& app);
+void add_convert(CLI::App& app);
 void add_export(CLI::App& app);
 void add_render(CLI::App& app);
 void add_evaluate(CLI::App& app);
@@ -23,6 +25,7 @@ void add_merge(CLI::App& app);
 void add_diff(CLI::App& app);
 void add_verify(CLI::App& app);
 void add_infer(CLI::App& app);
+void add_bench(CLI::App& app);
 void add_simulate(CLI::App& app);
 
 }  // namespace felt::apps

@@ -29,7 +29,7 @@ struct ExportOptions : CommonOptions {
   std::string color_by = "rgb", class_name, segment_at, properties, up = "+z";
   std::vector<double> box_m;  ///< x0 y0 z0 x1 y1 z1
   std::vector<std::string> grids;
-  bool half = false, overwrite = false;
+  bool half = false, compact = false, overwrite = false;
   RegionOptions segment;
 };
 
@@ -38,8 +38,10 @@ void check(const ExportOptions& o) {
   if (o.vdb.empty() && o.mesh.empty() && o.points.empty() && o.html.empty())
     problems.push_back(
         describe_mismatch("export", "what to write", "--vdb, --mesh, --points or --html", "none of them"));
-  if (o.vdb.empty() && (o.half || !o.grids.empty()))
-    problems.push_back(describe_mismatch("--grids, --half", "what to write", "--vdb FILE", "no --vdb"));
+  if (o.vdb.empty() && (o.half || o.compact || !o.grids.empty()))
+    problems.push_back(describe_mismatch("--grids, --half, --compact", "what to write", "--vdb FILE", "no --vdb"));
+  if (o.compact && (o.half || !o.grids.empty()))
+    problems.push_back(describe_mismatch("--compact", "a map file", "neither --grids nor --half", "one of them"));
   if (!o.box_m.empty() && !(o.box_m[0] < o.box_m[3] && o.box_m[1] < o.box_m[4] && o.box_m[2] < o.box_m[5]))
     problems.push_back(describe_mismatch("--box", "corners in metres", "x0,y0,z0,x1,y1,z1 with x0 < x1 and so on",
                                          nlohmann::json(o.box_m).dump()));
@@ -80,7 +82,7 @@ json write_vdb(const Map& map, const Region* part, const ExportOptions& o) {
     const Map& whole = map;
     const Map some = part == nullptr ? Map(map.voxel_size_m, map.truncation_m) : cropped(map, *part);
     const Map& saved = part == nullptr ? whole : some;
-    save_map(saved, o.vdb);
+    save_map(saved, o.vdb, o.compact ? SaveOptions{MapCompression::zip, false} : SaveOptions{});
     written["active_voxels"] = active_voxel_count(saved);
   } else {
     written["grids"] = export_vdb(map, o.vdb, {.grids = o.grids, .half = o.half, .part = part});
@@ -167,6 +169,7 @@ void add_export(CLI::App& app) {
       ->delimiter(',')
       ->option_text("NAME,...");
   command.add_flag("--half", o->half, "Store floats in 16 bits");
+  command.add_flag("--compact", o->compact, "A map file of least size: DEFLATE, and no grids that only viewers need");
   command.add_option("--color-by", o->color_by, "rgb, class, entropy, <property>.mean or <property>.sd")
       ->capture_default_str();
   command.add_option("--properties", o->properties, "Property table (YAML), for a map that has none");

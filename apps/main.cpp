@@ -24,8 +24,10 @@ void add_commands(CLI::App& app) {
   app.require_subcommand(1);
   app.set_version_flag("--version", [] { return "feltmap " FELTMAP_VERSION " (SIMD: " + simd_name() + ")"; });
   add_reconstruct(app);
+  add_doctor(app);
   add_segment(app);
   add_info(app);
+  add_convert(app);
   add_export(app);
   add_simulate(app);
   add_render(app);
@@ -40,6 +42,7 @@ void add_commands(CLI::App& app) {
   add_diff(app);
   add_verify(app);
   add_infer(app);
+  add_bench(app);
   app.footer("Each command explains itself, with an example: feltmap <command> --help");
 }
 

@@ -24,6 +24,7 @@
 #include "core/simd.h"
 #include "io/atomic_file.h"
 #include "io/decode_ahead.h"
+#include "io/doctor.h"
 #include "io/mesh_io.h"
 #include "io/open_sequence.h"
 #include "io/system_memory.h"
@@ -181,17 +182,31 @@ void print_summary(const ReconstructReport& report, const fs::path& folder) {
   for (const char* name : {kMapName, kMeshName, kReportName}) std::printf("  %s\n", (folder / name).c_str());
 }
 
+/// A few frames projected into each other before the work begins: what is likely wrong is said, and nothing changed.
+void warn_of_faults(const ReconstructOptions& options) {
+  try {
+    for (const Finding& finding : examine_quickly(options.sequence, options.reading).findings)
+      if (finding.faulty)
+        spdlog::warn("{}: {} ({}); try {}, and see feltmap doctor", finding.topic, finding.belief, finding.evidence,
+                     finding.remedy);
+  } catch (const Error&) {
+    // What cannot even be examined is reported where it is read.
+  }
+}
+
 int run(const ReconstructArguments& arguments, CommonOptions common) {
   const auto start = Clock::now();
   ReconstructOptions options = resolve(arguments, common.threads);
   common.threads = options.threads;
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(common.thread_count()));
   auto sequence = open_sequence(options.sequence, options.reading);
+  adopt_sequence_defaults(sequence->info(), options);
   const Perception perception = perception_of(options.perception, sequence->info().classes);
   const PreparedClasses classes = prepare_classes(options.labels, perception.classes(sequence->info()));
   const TouchPlan touches = plan_touches(options, *sequence, classes.table);
   prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite || options.resume);
   check_memory(*sequence, options);
+  warn_of_faults(options);
   sequence = perceived_sequence(std::move(sequence), perception);
 
   const nlohmann::ordered_json config = to_json(options);

@@ -80,7 +80,10 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
       ->option_text("FILE");
 
   const char* map = "Map";
-  command.add_option("--voxel-size", a.voxel_size_m, "Edge of a voxel, metres [0.02]")->group(map);
+  command
+      .add_option("--voxel-size", a.voxel_size_m,
+                  "Edge of a voxel, metres [0.02; what suits the sensor for some layouts: docs/datasets.md]")
+      ->group(map);
   command.add_option("--truncation", a.truncation, "Band around the surface: metres, or voxels as 4vox [4vox]")
       ->group(map);
   command.add_option("--min-depth", a.min_depth_m, "Nearer depth is not used, metres [0.1]")->group(map);
@@ -94,28 +97,12 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
   command.add_option("--max-weight", a.max_weight, "Cap of a voxel's summed weight")->group(map);
   command.add_flag("--carve", a.carve, "Let free space seen later erase what stood there")->group(map);
 
+  add_reading_options(command, a.reading);
   const char* reading = "Sequence (found in it, or the layout's default, unless given)";
-  command.add_option("--format", a.format, "Layout: 7scenes, tum, replica, generic, ...")->group(reading);
-  command.add_option("--frames", a.frames, "Frames a:b:step in recorded order, counted from 0")->group(reading);
-  command.add_option("--intrinsics", a.intrinsics, "fx,fy,cx,cy of the depth image, pixels")->group(reading);
-  command.add_option("--depth-scale", a.depth_scale, "Stored depth units per metre")->group(reading);
-  command.add_option("--depth-encoding", a.depth_encoding, "plain, or rotated3 (16 bits rotated left by 3)")
-      ->group(reading);
-  command.add_flag("--ray-length", a.ray_length, "Depth is the length of the ray, not z")->group(reading);
-  command.add_option("--pose-convention", a.pose_convention, "c2w or w2c, opencv or opengl; for example w2c,opengl")
-      ->group(reading);
-  command.add_option("--max-dt", a.max_dt_s, "Largest difference of stamps within a frame, seconds")->group(reading);
-  command.add_option("--labels", a.labels, "Folder of label images")->group(reading);
-  command
-      .add_option("--probs", a.probs,
-                  "Folder of class probability images (docs/semantics.md), or of confidences beside --labels")
-      ->group(reading);
-  command.add_option("--classes", a.classes, "Class table (classes.yaml, or a CSV of id and name)")->group(reading);
   command.add_option("--properties", a.properties, "Property table (properties.yaml)")->group(reading);
   command.add_option("--touches", a.touches, "Recorded touches (touches.csv), each at its stamp or frame")
       ->group(reading);
   add_label_options(command, a.label_settings);
-  command.add_flag("--no-color", a.no_color, "Do not read colour images")->group(reading);
   a.perception.add_to(command, "Perception", "--segmenter");
 }
 
@@ -128,44 +115,39 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   options.checkpoint_every = a.checkpoint_every, options.resume = a.resume;
   options.threads = threads > 0 ? threads : file.threads.value_or(0);
 
-  SequenceOptions& reading = options.reading;
-  reading.format = a.format.empty() ? file.format.value_or("") : a.format;
-  reading.labels_dir = a.labels.empty() ? file.labels : a.labels;
-  reading.probs_dir = a.probs.empty() ? file.probs : a.probs;
+  SequenceOptions configured;
+  configured.format = file.format.value_or("");
+  configured.labels_dir = file.labels, configured.probs_dir = file.probs, configured.classes_file = file.classes;
   options.properties = a.properties.empty() ? file.properties : a.properties;
   options.touches = a.touches.empty() ? file.touches : a.touches;
-  reading.classes_file = a.classes.empty() ? file.classes : a.classes;
-  reading.intrinsics = file.intrinsics;
-  reading.pose_convention = file.pose_convention;
-  reading.depth_encoding = file.depth_encoding;
-  reading.frames = file.frames.value_or(reading.frames);
-  if (!a.frames.empty()) problems.attempt([&] { reading.frames = parse_frame_selection(a.frames, "--frames"); });
-  if (!a.intrinsics.empty())
-    problems.attempt([&] { reading.intrinsics = parse_intrinsics(a.intrinsics, "--intrinsics"); });
-  if (!a.pose_convention.empty())
-    problems.attempt([&] { reading.pose_convention = parse_pose_convention(a.pose_convention, "--pose-convention"); });
-  if (!a.depth_encoding.empty())
-    problems.attempt([&] { reading.depth_encoding = parse_depth_encoding(a.depth_encoding, "--depth-encoding"); });
-  reading.depth_scale = a.depth_scale ? a.depth_scale : file.depth_scale;
-  reading.depth_is_ray_length = a.ray_length ? std::optional(true) : file.ray_length;
-  reading.max_dt_s = a.max_dt_s.value_or(file.max_dt_s.value_or(reading.max_dt_s));
-  reading.read_color = !a.no_color && file.color.value_or(true);
-  if (reading.depth_scale)
-    problems.expect(positive(*reading.depth_scale), "--depth-scale", "depth units per metre", "a number above 0",
-                    text_of(*reading.depth_scale));
-  problems.expect(positive(reading.max_dt_s), "--max-dt", "seconds", "a number above 0", text_of(reading.max_dt_s));
+  configured.intrinsics = file.intrinsics;
+  configured.pose_convention = file.pose_convention;
+  configured.depth_encoding = file.depth_encoding;
+  configured.frames = file.frames.value_or(configured.frames);
+  configured.depth_scale = file.depth_scale;
+  configured.depth_is_ray_length = file.ray_length;
+  configured.max_dt_s = file.max_dt_s.value_or(configured.max_dt_s);
+  configured.read_color = file.color.value_or(true);
+  problems.attempt([&] {
+    std::vector<std::string> found;
+    options.reading = apps::resolve(a.reading, configured, found);
+    if (!found.empty()) throw ConfigError(found);
+  });
 
+  SequenceOptions& reading = options.reading;
   options.perception = a.perception;
   reading.instances_dir = a.perception.instances;
   if (!a.perception.net.empty())
     problems.expect(reading.read_color, "--segmenter", "colour", "colour images to look at", "--no-color");
 
+  options.voxel_size_given = a.voxel_size_m || file.voxel_size_m;
+  options.max_depth_given = a.max_depth_m || file.max_depth_m;
   options.voxel_size_m = a.voxel_size_m.value_or(file.voxel_size_m.value_or(options.voxel_size_m));
   problems.expect(positive(options.voxel_size_m), "--voxel-size", "edge of a voxel in metres", "a number above 0",
                   text_of(options.voxel_size_m));
   problems.attempt([&] {
-    const std::string truncation = a.truncation.empty() ? file.truncation.value_or("4vox") : a.truncation;
-    options.truncation_m = parse_truncation(truncation, options.voxel_size_m, "--truncation");
+    options.truncation = a.truncation.empty() ? file.truncation.value_or("4vox") : a.truncation;
+    options.truncation_m = parse_truncation(options.truncation, options.voxel_size_m, "--truncation");
     if (positive(options.voxel_size_m) && !(options.truncation_m >= options.voxel_size_m))
       throw ConfigError(describe_mismatch("--truncation", "band around the surface", "at least one voxel",
                                           text_of(options.truncation_m) + " m"));
@@ -196,6 +178,14 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   return options;
 }
 
+void adopt_sequence_defaults(const SequenceInfo& info, ReconstructOptions& options) {
+  if (info.voxel_size_m > 0 && !options.voxel_size_given) {
+    options.voxel_size_m = info.voxel_size_m;
+    options.truncation_m = parse_truncation(options.truncation, options.voxel_size_m, "--truncation");
+  }
+  if (info.max_depth_m > 0 && !options.max_depth_given) options.fusion.max_depth_m = float(info.max_depth_m);
+}
+
 nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   const SequenceOptions& reading = options.reading;
   const IntegrationConfig& fusion = options.fusion;
@@ -217,6 +207,9 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   if (!options.properties.empty()) json["properties"] = options.properties.string();
   if (!options.touches.empty()) json["touches"] = options.touches.string();
   json["max_dt_s"] = reading.max_dt_s;
+  if (reading.pose_stamp_offset != 0) json["stamp_offset"] = reading.pose_stamp_offset;
+  if (reading.label_offset != 0) json["label_offset"] = reading.label_offset;
+  if (reading.bgr) json["bgr"] = true;
   json["color"] = reading.read_color;
   if (options.perception.asked()) json["perception"] = to_json(options.perception);
   json["voxel_size_m"] = options.voxel_size_m;

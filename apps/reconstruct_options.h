@@ -6,7 +6,9 @@
 #include <string>
 
 #include "apps/perception_options.h"
+#include "apps/reading_options.h"
 #include "io/label_settings.h"
+#include "io/reader.h"
 #include "io/sequence_options.h"
 #include "mapping/integration_config.h"
 
@@ -19,6 +21,8 @@ struct ReconstructOptions {
   std::filesystem::path properties, touches;  ///< empty: what the sequence carries, if anything
   double voxel_size_m = 0.02;
   double truncation_m = 0.08;
+  std::string truncation = "4vox";                         ///< as given
+  bool voxel_size_given = false, max_depth_given = false;  ///< else the sequence may know better
   IntegrationConfig fusion;
   PerceptionArguments perception;
   LabelSettings labels;
@@ -30,14 +34,15 @@ struct ReconstructOptions {
 
 /// The command line's own words. What is left empty keeps the default or the configuration file's value.
 struct ReconstructArguments {
-  std::filesystem::path config, sequence, out, labels, probs, classes, properties, touches;
-  std::string format, intrinsics, pose_convention, depth_encoding, frames, truncation;
-  std::optional<double> depth_scale, max_dt_s, voxel_size_m, min_depth_m, max_depth_m, max_weight;
+  std::filesystem::path config, sequence, out, properties, touches;
+  ReadingArguments reading;
+  std::string truncation;
+  std::optional<double> voxel_size_m, min_depth_m, max_depth_m, max_weight;
   std::optional<DistanceModel> distance;
   std::optional<WeightModel> weight;
   PerceptionArguments perception;
   LabelSettings label_settings;
-  bool ray_length = false, no_color = false, carve = false, overwrite = false, resume = false;
+  bool carve = false, overwrite = false, resume = false;
   int64_t checkpoint_every = 0;
 };
 
@@ -46,6 +51,9 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& arguments)
 /// Defaults, then the configuration file, then the command line (`threads`: its --threads, 0 where not given); checked
 /// together. Throws ConfigError with every problem at once.
 ReconstructOptions resolve(const ReconstructArguments& arguments, int threads);
+
+/// Takes over what the sequence's sensor asks for where the user said nothing.
+void adopt_sequence_defaults(const SequenceInfo& info, ReconstructOptions& options);
 
 /// The settings as used, for the report and the map.
 nlohmann::ordered_json to_json(const ReconstructOptions& options);

@@ -5,14 +5,14 @@
 #include <fstream>
 
 #include "core/error.h"
-#include "core/pose.h"
 #include "io/camera_file.h"
 #include "io/image_decode.h"
+#include "io/lidar_scan.h"
 #include "io/probability_images.h"
+#include "io/recorded_pose.h"
 #include "io/registration.h"
 #include "io/sequence_fingerprint.h"
 #include "io/text_input.h"
-#include "io/trajectory_file.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -77,15 +77,22 @@ private:
   DepthImage read_depth(const ImageSource& source) const;
   ColorImage read_color(const ImageSource& source, const DepthImage& depth_m) const;
   Image<uint16_t> read_ids(const ImageSource& source, const std::string& kind, const DepthImage& depth_m) const;
+  LabelImage read_labels(const ImageSource& source, const DepthImage& depth_m) const;
   Image<uint16_t> read_masks(const std::vector<ImageSource>& masks, const DepthImage& depth_m) const;
   ProbabilityImage read_probabilities(const ImageSource& source, const LabelImage& labels) const;
   ProbabilityImage read_class_maps(const FrameRecord& frame) const;
   PinholeCamera camera_of_color_grid(int width, int height) const;
   bool on_depth_grid(int width, int height) const;
+  /// Colour without a camera of its own comes through the depth camera's lens.
+  const Distortion& color_distortion() const {
+    return listing_.color_intrinsics ? listing_.color_distortion : listing_.distortion;
+  }
 
   SequenceListing listing_;
   SequenceInfo info_;
-  bool with_color_, with_instances_;
+  bool with_color_, with_instances_, bgr_;
+  int label_offset_;
+  Image<int32_t> undistortion_;    ///< of the depth grid; empty where the lens does not distort
   Image<float> z_per_ray_length_;  ///< empty where depth lies along the optical axis
 };
 
@@ -97,6 +104,7 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   info_.pose_convention = to_string(listing_.pose_convention);
   info_.classes = listing_.classes;
   info_.notes = listing_.notes;
+  info_.voxel_size_m = listing_.voxel_size_m, info_.max_depth_m = listing_.max_depth_m;
   info_.properties_file = listing_.properties_file;
   info_.touches_file = listing_.touches_file;
   info_.recorded_frames = int64_t(listing_.frames.size());
@@ -111,6 +119,8 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
     throw ConfigError(describe_mismatch("frames " + to_string(options.frames), "selection",
                                         "some of the " + std::to_string(info_.recorded_frames) + " frames", "none"));
   const auto any = [&](auto test) { return std::any_of(listing_.frames.begin(), listing_.frames.end(), test); };
+  bgr_ = options.bgr;
+  label_offset_ = options.label_offset;
   with_color_ = options.read_color && any([](const FrameRecord& f) { return !f.color.empty(); });
   info_.has_color = with_color_;
   info_.has_labels = any([](const FrameRecord& f) { return !f.labels.empty(); });
@@ -118,6 +128,7 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   with_instances_ = options.read_instances;
   info_.has_instances = any([](const FrameRecord& f) { return !f.instances.empty() || !f.masks.empty(); });
 
+  if (!listing_.distortion.none()) undistortion_ = undistortion_map(info_.camera, listing_.distortion);
   if (listing_.depth_is_ray_length) {
     z_per_ray_length_ = Image<float>(info_.camera.width, info_.camera.height);
     for (int v = 0; v < info_.camera.height; ++v)
@@ -168,7 +179,7 @@ ReadResult ListedSequence::read(int64_t i) const {
     frame.T_world_camera = read_pose(record);
     frame.depth_m = read_depth(record.depth);
     if (with_color_) frame.color = read_color(record.color, frame.depth_m);
-    if (!record.labels.empty()) frame.labels = read_ids(record.labels, "label", frame.depth_m);
+    if (!record.labels.empty()) frame.labels = read_labels(record.labels, frame.depth_m);
     if (with_instances_ && !record.instances.empty())
       frame.instances = read_ids(record.instances, "instance", frame.depth_m);
     if (with_instances_ && !record.masks.empty()) frame.instances = read_masks(record.masks, frame.depth_m);
@@ -183,35 +194,20 @@ ReadResult ListedSequence::read(int64_t i) const {
 }
 
 Eigen::Isometry3d ListedSequence::read_pose(const FrameRecord& frame) const {
-  Eigen::Matrix4d recorded;
-  std::string where = "trajectory";
-  if (frame.pose) {
-    recorded = *frame.pose;
-  } else if (std::error_code fault; frame.pose_file.empty() || !fs::exists(frame.pose_file, fault)) {
-    throw Skip{"missing pose", "no pose recorded"};
-  } else {
-    where = frame.pose_file.string();
-    try {
-      recorded = read_pose_file(frame.pose_file);
-    } catch (const Error& problem) {
-      throw Skip{"unreadable pose", problem.what()};
-    }
-  }
-  Eigen::Isometry3d T;
-  switch (rigid_pose(recorded, T)) {
-    case PoseFault::not_finite:
-      throw Skip{"non-finite pose", where};
-    case PoseFault::not_rigid:
-      throw Skip{"non-rigid pose", where};
-    case PoseFault::none:
-      break;
-  }
-  if (listing_.pose_convention.world_to_camera) T = T.inverse();
-  if (listing_.pose_convention.opengl_axes) T.linear() = T.linear() * Eigen::Vector3d(1, -1, -1).asDiagonal();
-  return T;
+  const auto recorded = recorded_pose(frame);
+  if (const auto* problem = std::get_if<PoseProblem>(&recorded)) throw Skip{problem->reason, problem->detail};
+  return camera_pose(std::get<Eigen::Isometry3d>(recorded), listing_.pose_convention, listing_.T_body_camera);
 }
 
 DepthImage ListedSequence::read_depth(const ImageSource& source) const {
+  if (source.codec == ImageSource::Codec::scan) {
+    DepthImage depth_m = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
+      return depth_of_scan(decode_scan(bytes, where), source.face);
+    });
+    if (std::none_of(depth_m.begin(), depth_m.end(), [](float depth) { return depth > 0; }))
+      throw Skip{"depth all zero", source.path.string()};
+    return depth_m;
+  }
   const Image<uint16_t> raw = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
     if (source.codec == ImageSource::Codec::image_file) return decode_gray16(bytes, where);
     return decode_u16_values(bytes, source.codec == ImageSource::Codec::zlib_u16, info_.camera.width,
@@ -232,6 +228,7 @@ DepthImage ListedSequence::read_depth(const ImageSource& source) const {
     depth_m.data()[p] = valid ? float(value) / scale : 0.0f;
   }
   if (!any) throw Skip{"depth all zero", source.path.string()};
+  if (!undistortion_.empty()) depth_m = undistorted(depth_m, undistortion_, 0.0f);
   for (size_t p = 0; p < z_per_ray_length_.size(); ++p) depth_m.data()[p] *= z_per_ray_length_.data()[p];
   return depth_m;
 }
@@ -249,15 +246,24 @@ PinholeCamera ListedSequence::camera_of_color_grid(int width, int height) const 
 
 ColorImage ListedSequence::read_color(const ImageSource& source, const DepthImage& depth_m) const {
   ColorImage image = decoded(source, "colour", decode_color);
-  if (on_depth_grid(image.width(), image.height())) return image;
+  if (bgr_)
+    for (Rgba8& pixel : image) std::swap(pixel.r, pixel.b);
+  const Rgba8 outside{0, 0, 0, 0};
+  if (on_depth_grid(image.width(), image.height())) {
+    if (!undistortion_.empty()) image = undistorted(image, undistortion_, outside);
+    return image;
+  }
   return registered_to_depth(image, camera_of_color_grid(image.width(), image.height()), depth_m, info_.camera,
-                             listing_.T_color_depth, Rgba8{0, 0, 0, 0});
+                             listing_.T_color_depth, outside, color_distortion());
 }
 
 Image<uint16_t> ListedSequence::read_ids(const ImageSource& source, const std::string& kind,
                                          const DepthImage& depth_m) const {
   Image<uint16_t> image = decoded(source, kind, decode_gray16);
-  if (image.width() == info_.camera.width && image.height() == info_.camera.height) return image;
+  if (image.width() == info_.camera.width && image.height() == info_.camera.height) {
+    if (!undistortion_.empty()) image = undistorted(image, undistortion_, kNoLabel);
+    return image;
+  }
   // Networks label the colour image: another size is right where it has the colour image's shape.
   const double shape = double(image.width()) * info_.camera.height / (double(image.height()) * info_.camera.width);
   if (!listing_.color_intrinsics && std::abs(shape - 1) > 0.02)
@@ -265,7 +271,17 @@ Image<uint16_t> ListedSequence::read_ids(const ImageSource& source, const std::s
                describe_mismatch(source.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
                                  size_text(image.width(), image.height()))};
   return registered_to_depth<uint16_t>(image, camera_of_color_grid(image.width(), image.height()), depth_m,
-                                       info_.camera, listing_.T_color_depth, kNoLabel);
+                                       info_.camera, listing_.T_color_depth, kNoLabel, color_distortion());
+}
+
+LabelImage ListedSequence::read_labels(const ImageSource& source, const DepthImage& depth_m) const {
+  LabelImage labels = read_ids(source, "label", depth_m);
+  for (uint16_t& id : labels) {
+    if (label_offset_ == 0) break;
+    const int moved = id + label_offset_;
+    if (id != kNoLabel) id = moved >= 0 && moved < kNoLabel ? uint16_t(moved) : kNoLabel;
+  }
+  return labels;
 }
 
 Image<uint16_t> ListedSequence::read_masks(const std::vector<ImageSource>& masks, const DepthImage& depth_m) const {

@@ -1,5 +1,6 @@
 #include "io/open_sequence.h"
 
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -9,7 +10,9 @@
 #include "io/layouts/file_names.h"
 #include "io/listed_sequence.h"
 #include "io/probability_images.h"
+#include "io/recorded_pose.h"
 #include "io/side_images.h"
+#include "io/trajectory_file.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -33,7 +36,7 @@ const Layout& detect_layout(const fs::path& path) {
   throw FormatError(describe_mismatch(path.string(), "sequence", looked_for, "none of these"));
 }
 
-SequenceListing list_sequence(const fs::path& path, const SequenceOptions& options) {
+SequenceListing list_as_recorded(const fs::path& path, const SequenceOptions& options) {
   std::error_code fault;
   if (!fs::exists(path, fault))
     throw IoError(describe_mismatch(path.string(), "sequence", "a folder or file", "nothing"));
@@ -48,6 +51,27 @@ SequenceListing list_sequence(const fs::path& path, const SequenceOptions& optio
     throw FormatError(
         describe_mismatch(path.string(), std::string(layout.name) + " sequence", layout.looks_for, "no frames"));
   return listing;
+}
+
+/// Adds `offset` to the stamps of the poses: each frame takes the pose between its new neighbours. Frames whose new
+/// moment is not within the trajectory have none. Layouts with a trajectory of its own rate do it themselves.
+void shift_poses(double offset, SequenceListing& listing) {
+  std::vector<StampedPose> poses;
+  std::vector<double> stamps;
+  for (const FrameRecord& frame : listing.frames) {
+    const auto recorded = recorded_pose(frame);
+    if (!std::holds_alternative<Eigen::Isometry3d>(recorded)) continue;
+    if (!stamps.empty() && frame.stamp_s <= stamps.back()) continue;
+    poses.push_back({frame.stamp_s, std::get<Eigen::Isometry3d>(recorded).matrix(), 0});
+    stamps.push_back(frame.stamp_s);
+  }
+  for (FrameRecord& frame : listing.frames) {
+    const double moment = frame.stamp_s - offset;
+    frame.pose_file.clear();
+    frame.pose.reset();
+    if (stamps.empty() || moment < stamps.front() || moment > stamps.back()) continue;
+    frame.pose = pose_at_stamp(poses, stamps, moment, std::numeric_limits<double>::infinity());
+  }
 }
 
 /// The table that lies with a folder of label images: in it, or beside it under its name (`material/` and
@@ -82,11 +106,19 @@ void choose_class_table(const SequenceOptions& options, SequenceListing& listing
 }
 
 void apply_options(const SequenceOptions& options, SequenceListing& listing) {
-  if (options.intrinsics) listing.intrinsics = options.intrinsics;
+  if (options.intrinsics) {
+    listing.intrinsics = options.intrinsics;
+    // The user's word against the camera file's size too; containers of raw values need their own.
+    if (listing.frames.front().depth.codec == ImageSource::Codec::image_file) listing.width = listing.height = 0;
+  }
   if (options.depth_scale) listing.depth_scale = *options.depth_scale;
   if (options.depth_encoding) listing.depth_encoding = *options.depth_encoding;
   if (options.depth_is_ray_length) listing.depth_is_ray_length = *options.depth_is_ray_length;
+  if (options.distortion) listing.distortion = *options.distortion;
+  if (options.T_body_camera) listing.T_body_camera = *options.T_body_camera;
   if (options.pose_convention) listing.pose_convention = *options.pose_convention;
+  if (options.pose_stamp_offset != 0 && listing.layout != kTumLayout.name)
+    shift_poses(options.pose_stamp_offset, listing);
   if (!(listing.depth_scale > 0 && listing.depth_scale < 1e9))
     throw ConfigError(
         describe_mismatch("depth scale", "units per metre", "a number above 0", std::to_string(listing.depth_scale)));
@@ -100,22 +132,34 @@ void apply_options(const SequenceOptions& options, SequenceListing& listing) {
                                         "one in the folder, beside it, in the sequence, or by --classes FILE", "none"));
 }
 
+/// Runs a step and turns the standard library's complaint about a file into ours.
+template <typename Step>
+auto with_io_errors(Step step) {
+  try {
+    return step();
+  } catch (const fs::filesystem_error& fault) {
+    throw IoError(fault.path1().string() + ": " + fault.code().message());
+  }
+}
+
 }  // namespace
 
 std::span<const Layout> all_layouts() {
   static const Layout layouts[] = {kGenericLayout, kTumLayout,     kReplicaLayout, kApcLayout, kSevenScenesLayout,
-                                   kSensLayout,    kScanNetLayout, kRedwoodLayout, kIclLayout};
+                                   kSensLayout,    kScanNetLayout, kRedwoodLayout, kIclLayout, kLidarLayout};
   return layouts;
 }
 
-std::unique_ptr<SequenceReader> open_sequence(const fs::path& path, const SequenceOptions& options) {
-  try {
-    SequenceListing listing = list_sequence(path, options);
+SequenceListing list_sequence(const fs::path& path, const SequenceOptions& options) {
+  return with_io_errors([&] {
+    SequenceListing listing = list_as_recorded(path, options);
     apply_options(options, listing);
-    return make_listed_sequence(path, options, std::move(listing));
-  } catch (const fs::filesystem_error& fault) {
-    throw IoError(fault.path1().string() + ": " + fault.code().message());
-  }
+    return listing;
+  });
+}
+
+std::unique_ptr<SequenceReader> open_sequence(const fs::path& path, const SequenceOptions& options) {
+  return with_io_errors([&] { return make_listed_sequence(path, options, list_sequence(path, options)); });
 }
 
 }  // namespace felt

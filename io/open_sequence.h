@@ -4,9 +4,14 @@
 #include <memory>
 
 #include "io/reader.h"
+#include "io/sequence_listing.h"
 #include "io/sequence_options.h"
 
 namespace felt {
+
+/// What the layout of `path` finds, with the user's options applied: names, poses and camera as plain data, nothing
+/// decoded. All recorded frames, before any selection. Throws as `open_sequence` does.
+SequenceListing list_sequence(const std::filesystem::path& path, const SequenceOptions& options = {});
 
 /// Opens a recorded sequence: detects its layout (or takes `options.format`), reads poses, names and camera, and checks
 /// that they belong together. Nothing is decoded but the header of the first depth image.

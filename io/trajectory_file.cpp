@@ -6,10 +6,19 @@
 #include <limits>
 
 #include "core/error.h"
+#include "core/pose.h"
 #include "io/text_input.h"
 
 namespace felt {
 namespace fs = std::filesystem;
+
+Eigen::Isometry3d interpolated_pose(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double share) {
+  const Eigen::AngleAxisd turn(Eigen::Quaterniond(a.linear().transpose() * b.linear()).normalized());
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = a.linear() * Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
+  T.translation() = a.translation() + share * (b.translation() - a.translation());
+  return T;
+}
 
 Eigen::Matrix4d matrix_of_numbers(const double* numbers, size_t count) {
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
@@ -69,6 +78,22 @@ int64_t nearest_stamp(const std::vector<double>& stamps, double stamp_s, double 
   if (after != stamps.begin() && (after == stamps.end() || stamp_s - *(after - 1) <= *after - stamp_s)) --best;
   if (best == stamps.end() || std::abs(*best - stamp_s) > max_dt_s) return -1;
   return best - stamps.begin();
+}
+
+std::optional<Eigen::Matrix4d> pose_at_stamp(const std::vector<StampedPose>& poses, const std::vector<double>& stamps,
+                                             double stamp_s, double max_dt_s) {
+  const int64_t nearest = nearest_stamp(stamps, stamp_s, max_dt_s);
+  if (nearest < 0) return std::nullopt;
+  const auto n = size_t(nearest);
+  const size_t before = stamps[n] <= stamp_s ? n : n - 1, after = before + 1;
+  const bool outside = (n == 0 && stamps[n] > stamp_s) || after >= stamps.size();
+  if (outside || stamps[n] == stamp_s || stamp_s - stamps[before] > max_dt_s || stamps[after] - stamp_s > max_dt_s ||
+      stamps[after] <= stamps[before])
+    return poses[n].matrix;
+  Eigen::Isometry3d a, b;
+  if (rigid_pose(poses[before].matrix, a) != PoseFault::none || rigid_pose(poses[after].matrix, b) != PoseFault::none)
+    return poses[n].matrix;
+  return interpolated_pose(a, b, (stamp_s - stamps[before]) / (stamps[after] - stamps[before])).matrix();
 }
 
 std::vector<bool> out_of_order(const std::vector<double>& stamps) {

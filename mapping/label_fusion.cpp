@@ -132,23 +132,20 @@ struct SoftPixel {
   /// Gives the dropped mass to the classes that are not named, evenly: what all share, and less for those named.
   float spread(int k) {
     if (dropped > 0) join_repeated();
-    for (bool again = true; again;) {
-      again = false;
+    for (;;) {
       const int others = k - int(named.size());
-      if (!(dropped > 0) || others <= 0) return 0;
+      if (!(dropped > 0) || others <= 0) return dropped;  // nobody is unnamed: all share it
       const float share = dropped / float(others);
-      for (size_t i = 0; i < named.size(); ++i)
-        if (named[i].evidence < share) {  // no top class: one of the others
-          dropped += named[i].evidence;
-          named.erase(named.begin() + std::ptrdiff_t(i));
-          again = true;
-          break;
-        }
-      if (again) continue;
+      const auto least = std::min_element(named.begin(), named.end(),
+                                          [](const auto& a, const auto& b) { return a.evidence < b.evidence; });
+      if (least != named.end() && least->evidence < share) {  // no top class: one of the others
+        dropped += least->evidence;
+        named.erase(least);
+        continue;
+      }
       for (LabelEvidence::Share& n : named) n.evidence -= share;
       return share * float(k);
     }
-    return 0;
   }
 
 private:

@@ -51,6 +51,7 @@ std::vector<double> sort_by_stamp(std::vector<T>& items) {
 SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   SequenceListing listing;
   listing.depth_scale = 5000;
+  listing.stamped = true;
   const std::vector<StampedFile> depth = read_file_list(path / "depth.txt");
   std::vector<StampedFile> color;
   if (fs::exists(path / "rgb.txt")) color = read_file_list(path / "rgb.txt");
@@ -81,11 +82,8 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
     };
     const std::string within = " within " + std::to_string(options.max_dt_s) + " s";
     if (disordered[i]) refuse("stamp out of order", "not after the stamps before it");
-    const int64_t pose = nearest_stamp(pose_stamps, frame.stamp_s, options.max_dt_s);
-    if (pose >= 0)
-      frame.pose = poses[size_t(pose)].matrix;
-    else
-      refuse("missing pose", "no pose" + within);
+    frame.pose = pose_at_stamp(poses, pose_stamps, frame.stamp_s - options.pose_stamp_offset, options.max_dt_s);
+    if (!frame.pose) refuse("missing pose", "no pose" + within);
     // Colour belongs to one depth image only, the nearest to it: a neighbour's colour would be smeared over this one.
     const int64_t partner = nearest_stamp(color_stamps, frame.stamp_s, options.max_dt_s);
     const int64_t its_depth =

@@ -9,7 +9,8 @@ namespace {
 ClassTable table(int k, const std::vector<double>& priors = {}) {
   std::vector<ClassInfo> classes;
   for (int i = 0; i < k; ++i)
-    classes.push_back({.id = uint16_t(i), .name = std::to_string(i), .prior = priors.empty() ? 1 : priors[size_t(i)]});
+    classes.push_back(
+        {.id = uint16_t(i), .name = std::to_string(i), .color = {}, .prior = priors.empty() ? 1 : priors[size_t(i)]});
   return ClassTable(classes);
 }
 

@@ -1,0 +1,78 @@
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "apps/command.h"
+#include "apps/commands.h"
+#include "apps/exit_code.h"
+#include "apps/interrupt.h"
+#include "apps/progress.h"
+#include "apps/reading_options.h"
+#include "io/convert.h"
+#include "io/open_sequence.h"
+
+namespace felt::apps {
+namespace {
+
+struct Arguments {
+  std::filesystem::path sequence, out;
+  ReadingArguments reading;
+  ConvertOptions options;
+  CommonOptions common;
+};
+
+int run(const Arguments& a) {
+  const auto reader = open_sequence(a.sequence, resolve(a.reading));
+  ProgressBar progress("frames", reader->size(), !a.common.quiet);
+  const InterruptGuard interrupt;
+  const ConvertResult result = convert_sequence(*reader, a.out, a.options, [&](int64_t done) {
+    progress.update(done);
+    return !interrupt.requested();
+  });
+  if (interrupt.requested()) {
+    std::fprintf(stderr, "feltmap: interrupted: nothing is left at %s\n", a.out.c_str());
+    return kInterrupted;
+  }
+  if (a.common.json) {
+    const nlohmann::ordered_json json = {{"layout", a.options.layout},
+                                         {"path", a.out.string()},
+                                         {"written", result.written},
+                                         {"skipped", result.skipped},
+                                         {"depth_out_of_range", result.depth_out_of_range}};
+    std::printf("%s\n", json.dump(2).c_str());
+  } else if (!a.common.quiet) {
+    std::printf("%lld frames written to %s (%s)\n", static_cast<long long>(result.written), a.out.c_str(),
+                a.options.layout.c_str());
+    for (const auto& [reason, count] : result.skipped)
+      std::printf("  skipped %lld: %s\n", static_cast<long long>(count), reason.c_str());
+    if (result.depth_out_of_range > 0)
+      std::printf("  %lld measured pixels are too far for 16 bits at this depth scale\n",
+                  static_cast<long long>(result.depth_out_of_range));
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void add_convert(CLI::App& app) {
+  auto a = std::make_shared<Arguments>();
+  CLI::App& command = add_command(app,
+                                  {"convert", "Write a sequence in another layout",
+                                   "feltmap convert rgbd_dataset_freiburg1_rpy --to generic --out recording\n"
+                                   "feltmap convert scene0000_00.sens --to tum --out scene --frames ::5"},
+                                  a->common, [a] { return run(*a); });
+  command.add_option("SEQUENCE", a->sequence, "Folder of a recorded RGB-D sequence, or a .sens file")->required();
+  command.add_option("--out", a->out, "Folder to make")->required();
+  command.add_option("--to", a->options.layout, "Layout to write")
+      ->check(CLI::IsMember(writable_layouts()))
+      ->capture_default_str();
+  command
+      .add_option("--written-depth-scale", a->options.depth_scale,
+                  "Stored depth units per metre in the result; 0: the layout's own")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command.add_flag("--renumber", a->options.renumber, "Number frames from 0");
+  command.add_flag("--jpeg", a->options.jpeg_color, "Colour as JPEG instead of PNG");
+  add_reading_options(command, a->reading);
+}
+
+}  // namespace felt::apps

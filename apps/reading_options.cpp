@@ -1,0 +1,97 @@
+#include "apps/reading_options.h"
+
+#include <cmath>
+#include <functional>
+
+#include "core/error.h"
+#include "io/pose_list.h"
+
+namespace felt::apps {
+
+void add_reading_options(CLI::App& command, ReadingArguments& a) {
+  const char* reading = "Sequence (found in it, or the layout's default, unless given)";
+  command.add_option("--format", a.format, "Layout: 7scenes, tum, replica, generic, ...")->group(reading);
+  command.add_option("--frames", a.frames, "Frames a:b:step in recorded order, counted from 0")->group(reading);
+  command.add_option("--intrinsics", a.intrinsics, "fx,fy,cx,cy of the depth image, pixels")->group(reading);
+  command.add_option("--distortion", a.distortion, "k1,k2,p1,p2[,k3] of the depth image's lens (radial-tangential)")
+      ->group(reading);
+  command.add_option("--depth-scale", a.depth_scale, "Stored depth units per metre")->group(reading);
+  command.add_option("--depth-encoding", a.depth_encoding, "plain, or rotated3 (16 bits rotated left by 3)")
+      ->group(reading);
+  command.add_flag("--ray-length,!--no-ray-length", a.ray_length, "Depth is the length of the ray, not z")
+      ->group(reading);
+  command.add_option("--pose-convention", a.pose_convention, "c2w or w2c, opencv or opengl; for example w2c,opengl")
+      ->group(reading);
+  command
+      .add_option("--body-camera", a.body_camera,
+                  "Pose of the camera on the body whose poses are recorded: tx ty tz qx qy qz qw, or 12 or 16 numbers")
+      ->group(reading);
+  command.add_option("--max-dt", a.max_dt_s, "Largest difference of stamps within a frame, seconds")->group(reading);
+  command
+      .add_option("--stamp-offset", a.stamp_offset, "Added to the stamps of poses: seconds, or frames where numbered")
+      ->group(reading);
+  command.add_option("--labels", a.labels, "Folder of label images")->group(reading);
+  command.add_option("--label-offset", a.label_offset, "Added to every label id")->group(reading);
+  command
+      .add_option("--probs", a.probs,
+                  "Folder of class probability images (docs/semantics.md), or of confidences beside --labels")
+      ->group(reading);
+  command.add_option("--classes", a.classes, "Class table (classes.yaml, or a CSV of id and name)")->group(reading);
+  command.add_flag("--bgr", a.bgr, "Colour images hold red and blue exchanged")->group(reading);
+  command.add_flag("--no-color", a.no_color, "Do not read colour images")->group(reading);
+}
+
+SequenceOptions resolve(const ReadingArguments& a, SequenceOptions reading, std::vector<std::string>& problems) {
+  const auto attempt = [&](const std::string& text, auto step) {
+    if (text.empty()) return;
+    try {
+      step();
+    } catch (const ConfigError& problem) {
+      problems.emplace_back(problem.what());
+    }
+  };
+  if (!a.format.empty()) reading.format = a.format;
+  if (!a.labels.empty()) reading.labels_dir = a.labels;
+  if (!a.probs.empty()) reading.probs_dir = a.probs;
+  if (!a.classes.empty()) reading.classes_file = a.classes;
+  attempt(a.frames, [&] { reading.frames = parse_frame_selection(a.frames, "--frames"); });
+  attempt(a.intrinsics, [&] { reading.intrinsics = parse_intrinsics(a.intrinsics, "--intrinsics"); });
+  attempt(a.distortion, [&] { reading.distortion = parse_distortion(a.distortion, "--distortion"); });
+  attempt(a.body_camera, [&] {
+    try {
+      reading.T_body_camera = parse_pose(a.body_camera, "--body-camera");
+    } catch (const FormatError& fault) {
+      throw ConfigError(fault.what());
+    }
+  });
+  attempt(a.pose_convention,
+          [&] { reading.pose_convention = parse_pose_convention(a.pose_convention, "--pose-convention"); });
+  attempt(a.depth_encoding,
+          [&] { reading.depth_encoding = parse_depth_encoding(a.depth_encoding, "--depth-encoding"); });
+  if (a.depth_scale) reading.depth_scale = a.depth_scale;
+  if (a.ray_length) reading.depth_is_ray_length = a.ray_length;
+  if (a.max_dt_s) reading.max_dt_s = *a.max_dt_s;
+  if (a.stamp_offset) reading.pose_stamp_offset = *a.stamp_offset;
+  if (a.label_offset != 0) reading.label_offset = a.label_offset;
+  reading.bgr |= a.bgr;
+  reading.read_color &= !a.no_color;
+  const auto expect = [&](bool good, const std::string& where, const std::string& what, double found) {
+    if (!good) problems.push_back(describe_mismatch(where, what, "a number above 0", std::to_string(found)));
+  };
+  if (reading.depth_scale)
+    expect(std::isfinite(*reading.depth_scale) && *reading.depth_scale > 0, "--depth-scale", "depth units per metre",
+           *reading.depth_scale);
+  expect(std::isfinite(reading.max_dt_s) && reading.max_dt_s > 0, "--max-dt", "seconds", reading.max_dt_s);
+  if (!std::isfinite(reading.pose_stamp_offset))
+    problems.push_back(describe_mismatch("--stamp-offset", "offset", "a finite number", "another"));
+  return reading;
+}
+
+SequenceOptions resolve(const ReadingArguments& arguments) {
+  std::vector<std::string> problems;
+  const SequenceOptions options = resolve(arguments, {}, problems);
+  if (!problems.empty()) throw ConfigError(problems);
+  return options;
+}
+
+}  // namespace felt::apps

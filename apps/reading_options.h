@@ -1,0 +1,35 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/sequence_options.h"
+
+namespace felt::apps {
+
+/// How a sequence is to be read, in the command line's own words: shared by every command that opens one. What is left
+/// empty is found in the sequence or is the layout's default.
+struct ReadingArguments {
+  std::string format, intrinsics, pose_convention, depth_encoding, frames;
+  std::filesystem::path labels, probs, classes;
+  std::optional<double> depth_scale, max_dt_s;
+  std::optional<bool> ray_length;
+  bool no_color = false, bgr = false;
+  std::optional<double> stamp_offset;
+  std::string distortion, body_camera;
+  int label_offset = 0;
+};
+
+/// Adds the options in a group of the help.
+void add_reading_options(CLI::App& command, ReadingArguments& arguments);
+
+/// Lays what was given over `base` (a configuration file's settings, or defaults). Adds to `problems` what cannot be
+/// used.
+SequenceOptions resolve(const ReadingArguments& arguments, SequenceOptions base, std::vector<std::string>& problems);
+
+/// The same without a base; throws ConfigError.
+SequenceOptions resolve(const ReadingArguments& arguments);
+
+}  // namespace felt::apps

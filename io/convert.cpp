@@ -1,0 +1,249 @@
+#include "io/convert.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstdio>
+
+#include "core/error.h"
+#include "io/image_encode.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+/// Where a layout keeps each kind of file, as printf patterns of the frame number; empty: it has no place for it.
+struct FileNames {
+  const char* layout;
+  double depth_scale;  ///< 0: the sequence's own
+  bool counts_from_zero;
+  const char *depth, *color, *labels, *probabilities, *instances, *pose;
+};
+
+constexpr FileNames kLayouts[] = {
+    {"generic", 0, false, "depth/%06lld.png", "color/%06lld", "labels/%06lld.png", "probs/%06lld.png",
+     "instances/%06lld.png", ""},
+    {"7scenes", 1000, false, "seq-01/frame-%06lld.depth.png", "seq-01/frame-%06lld.color",
+     "seq-01/frame-%06lld.label.png", "", "", "seq-01/frame-%06lld.pose.txt"},
+    {"tum", 5000, false, "depth/%06lld.png", "rgb/%06lld", "", "", "", ""},
+    {"replica", 6553.5, true, "results/depth%06lld.png", "results/frame%06lld", "semantic/semantic%06lld.png", "",
+     "instance/instance%06lld.png", ""},
+    {"redwood", 1000, true, "depth/%05lld.png", "color/%05lld", "", "", "", ""},
+    {"icl", 1000, false, "depth/%05lld.png", "color/%05lld", "labels/%05lld.png", "", "", "pose/%05lld.txt"},
+};
+
+std::string named(const char* pattern, int64_t number) {
+  char name[96];
+  std::snprintf(name, sizeof name, pattern, static_cast<long long>(number));
+  return name;
+}
+
+std::string number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.17g", value);
+  return text;
+}
+
+/// The 16 numbers by rows, `between` after each row but the last.
+std::string matrix_text(const Eigen::Isometry3d& T, const char* between) {
+  std::string text;
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column)
+      text += (row + column == 0 ? "" : column == 0 ? between : " ") + number(T.matrix()(row, column));
+  return text;
+}
+
+std::string translation_quaternion_text(const Eigen::Isometry3d& T) {
+  const Eigen::Quaterniond q(T.linear());
+  std::string text;
+  for (const double value : {T.translation().x(), T.translation().y(), T.translation().z(), q.x(), q.y(), q.z(), q.w()})
+    text += (text.empty() ? "" : " ") + number(value);
+  return text;
+}
+
+/// Writes one sequence, frame by frame; the text files come at the end.
+class Writer {
+public:
+  Writer(const FileNames& names, fs::path folder, const SequenceInfo& info, const ConvertOptions& options)
+      : names_(names),
+        folder_(std::move(folder)),
+        info_(info),
+        from_zero_(names.counts_from_zero || options.renumber),
+        jpeg_(options.jpeg_color) {
+    depth_scale_ = options.depth_scale > 0 ? options.depth_scale
+                   : names.depth_scale > 0 ? names.depth_scale
+                                           : info.depth_scale;
+  }
+
+  void add(const Frame& frame, ConvertResult& result) {
+    const int64_t i = from_zero_ ? result.written : frame.index;
+    put(named(names_.depth, i), encode_png(stored_depth(frame.depth_m, depth_scale_, result.depth_out_of_range)));
+    const std::string color = named(names_.color, i) + (jpeg_ ? ".jpg" : ".png");
+    if (!frame.color.empty()) put(color, jpeg_ ? encode_jpeg(frame.color) : encode_png(frame.color));
+    if (!frame.labels.empty() && *names_.labels != 0) put(named(names_.labels, i), encode_png(frame.labels));
+    if (!frame.instances.empty() && *names_.instances != 0)
+      put(named(names_.instances, i), encode_png(frame.instances));
+    if (!frame.probabilities.empty() && *names_.probabilities != 0)
+      put(named(names_.probabilities, i), encode_png(stacked(frame.probabilities)));
+    if (*names_.pose != 0) put(named(names_.pose, i), matrix_text(frame.T_world_camera, "\n") + "\n");
+    if (names_.layout == std::string("tum")) {
+      const std::string stamp = number_with_microseconds(frame.stamp_s);
+      depth_list_ += stamp + " " + named(names_.depth, i) + "\n";
+      if (!frame.color.empty()) color_list_ += stamp + " " + color + "\n";
+      poses_ += stamp + " " + translation_quaternion_text(frame.T_world_camera) + "\n";
+    } else if (names_.layout == std::string("redwood")) {
+      poses_ += std::to_string(i) + " " + std::to_string(i) + " " + std::to_string(i + 1) + "\n" +
+                matrix_text(frame.T_world_camera, "\n") + "\n";
+    } else if (names_.layout == std::string("replica")) {
+      poses_ += matrix_text(frame.T_world_camera, " ") + "\n";
+    } else {
+      poses_ += std::to_string(i) + " " + matrix_text(frame.T_world_camera, " ") + "\n";
+    }
+    ++result.written;
+  }
+
+  void finish() {
+    const PinholeCamera& c = info_.camera;
+    const std::string fx = number(c.fx), fy = number(c.fy), cx = number(c.cx), cy = number(c.cy),
+                      width = std::to_string(c.width), height = std::to_string(c.height), scale = number(depth_scale_);
+    const std::string rows = fx + " 0 " + cx + "\n0 " + fy + " " + cy + "\n0 0 1\n";
+    const std::string layout = names_.layout;
+    if (layout == "generic") {
+      put("sequence.yaml", "camera: {fx: " + fx + ", fy: " + fy + ", cx: " + cx + ", cy: " + cy + ", width: " + width +
+                               ", height: " + height + "}\ndepth_scale: " + scale +
+                               "\npose_convention: camera-to-world\n");
+      put("poses.txt", poses_);
+    } else if (layout == "tum") {
+      put("depth.txt", "# timestamp filename\n" + depth_list_);
+      put("rgb.txt", "# timestamp filename\n" + color_list_);
+      put("groundtruth.txt", "# timestamp tx ty tz qx qy qz qw\n" + poses_);
+      put("camera-intrinsics.txt", rows);
+    } else if (layout == "replica") {
+      put("traj.txt", poses_);
+      put("cam_params.json", "{\"camera\": {\"w\": " + width + ", \"h\": " + height + ", \"fx\": " + fx + ", \"fy\": " +
+                                 fy + ", \"cx\": " + cx + ", \"cy\": " + cy + ", \"scale\": " + scale + "}}\n");
+    } else if (layout == "redwood") {
+      put("trajectory.log", poses_);
+      put("intrinsic.json", "{\"width\": " + width + ", \"height\": " + height + ", \"intrinsic_matrix\": [" + fx +
+                                ", 0, 0, 0, " + fy + ", 0, " + cx + ", " + cy + ", 1]}\n");
+    } else {
+      put(layout == "7scenes" ? "camera-intrinsics.txt" : "intrinsics.txt", rows);
+    }
+    if (!info_.classes.empty()) put("classes.yaml", classes_text());
+  }
+
+private:
+  template <typename Bytes>
+  void put(const std::string& name, const Bytes& bytes) {
+    const fs::path path = folder_ / name;
+    std::error_code fault;
+    fs::create_directories(path.parent_path(), fault);
+    if (fault) throw IoError(path.parent_path().string() + ": cannot be made: " + fault.message());
+    write_bytes(path, {bytes.begin(), bytes.end()});
+  }
+
+  static std::string number_with_microseconds(double value) {
+    char text[48];
+    std::snprintf(text, sizeof text, "%.6f", value);
+    return text;
+  }
+
+  /// The stacked top-m image of docs/datasets.md.
+  static Image<uint16_t> stacked(const ProbabilityImage& image) {
+    const size_t pixels = size_t(image.width) * image.height, top = size_t(image.top);
+    Image<uint16_t> stack(image.width, image.height * 2 * image.top);
+    for (size_t m = 0; m < top; ++m)
+      for (size_t p = 0; p < pixels; ++p) {
+        stack.data()[m * pixels + p] = image.class_id[p * top + m];
+        stack.data()[(top + m) * pixels + p] = uint16_t(std::lround(image.probability[p * top + m] * 65535));
+      }
+    return stack;
+  }
+
+  std::string classes_text() const {
+    std::string text = "classes:\n";
+    for (const ClassInfo& info : info_.classes.classes()) {
+      std::string name;
+      for (const char c : info.name) name += c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
+      text += "  - {id: " + std::to_string(info.id) + ", name: \"" + name + "\", color: [" +
+              std::to_string(info.color.r) + ", " + std::to_string(info.color.g) + ", " + std::to_string(info.color.b) +
+              "]" + (info.ignore ? ", ignore: true" : "") + "}\n";
+    }
+    return text;
+  }
+
+  const FileNames& names_;
+  fs::path folder_;
+  const SequenceInfo& info_;
+  bool from_zero_, jpeg_;
+  double depth_scale_ = 0;
+  std::string poses_, depth_list_, color_list_;
+};
+
+const FileNames& names_of(const std::string& layout) {
+  std::string known;
+  for (const FileNames& names : kLayouts) {
+    if (names.layout == layout) return names;
+    known += (known.empty() ? "" : ", ") + std::string(names.layout);
+  }
+  throw ConfigError(describe_mismatch("--to", "layout", "one of " + known, "'" + layout + "'"));
+}
+
+}  // namespace
+
+std::vector<std::string> writable_layouts() {
+  std::vector<std::string> layouts;
+  for (const FileNames& names : kLayouts) layouts.emplace_back(names.layout);
+  return layouts;
+}
+
+Image<uint16_t> stored_depth(const DepthImage& depth_m, double depth_scale, int64_t& out_of_range) {
+  Image<uint16_t> stored(depth_m.width(), depth_m.height());
+  for (size_t p = 0; p < depth_m.size(); ++p) {
+    const double value = std::round(double(depth_m.data()[p]) * depth_scale);
+    const bool fits = value >= 1 && value < 65535;  // 65535 marks missing depth in some layouts
+    stored.data()[p] = fits ? uint16_t(value) : 0;
+    out_of_range += !fits && depth_m.data()[p] > 0;
+  }
+  return stored;
+}
+
+ConvertResult convert_sequence(const SequenceReader& reader, const fs::path& out, const ConvertOptions& options,
+                               const std::function<bool(int64_t)>& progress) {
+  const FileNames& names = names_of(options.layout);
+  std::error_code fault;
+  if (fs::exists(out, fault) && !(fs::is_directory(out) && fs::is_empty(out)))
+    throw IoError(describe_mismatch(out.string(), "output", "a folder that does not exist yet", "something there"));
+  fs::path partial = out;
+  partial += ".partial";
+  fs::remove_all(partial, fault);
+  fs::create_directories(partial, fault);
+  if (fault) throw IoError(partial.string() + ": cannot be made: " + fault.message());
+  ConvertResult result;
+  try {
+    Writer writer(names, partial, reader.info(), options);
+    for (int64_t i = 0; i < reader.size(); ++i) {
+      const ReadResult read = reader.read(i);
+      if (const auto* skipped = std::get_if<SkippedFrame>(&read))
+        ++result.skipped[skipped->reason];
+      else
+        writer.add(std::get<Frame>(read), result);
+      if (progress && !progress(i + 1)) {
+        fs::remove_all(partial, fault);
+        return {};
+      }
+    }
+    if (result.written == 0)
+      throw FormatError(
+          describe_mismatch(reader.info().path.string(), "frames", "at least one that can be read", "none"));
+    writer.finish();
+  } catch (...) {
+    fs::remove_all(partial, fault);
+    throw;
+  }
+  fs::remove(out, fault);
+  fs::rename(partial, out, fault);
+  if (fault) throw IoError(out.string() + ": cannot be made: " + fault.message());
+  return result;
+}
+
+}  // namespace felt

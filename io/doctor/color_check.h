@@ -1,0 +1,17 @@
+#pragma once
+
+#include <optional>
+
+#include "core/class_table.h"
+#include "io/doctor/cross_projection.h"
+#include "io/doctor/finding.h"
+
+namespace felt {
+
+/// Whether red and blue are exchanged, from the balance of the sampled frames' colours: surfaces indoors and out are
+/// mostly warm (wood, skin, walls in artificial light), so that the sum of R - B over pixels is positive: 0.3 to 0.9 of
+/// the sum of |R - B| in recordings looked at. Scenes of snow, ice, water or sky by their class table are not judged.
+/// Nothing where there is no colour.
+std::optional<Finding> check_color_order(const std::vector<SampledFrame>& frames, const ClassTable& classes);
+
+}  // namespace felt

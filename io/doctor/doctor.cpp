@@ -1,0 +1,96 @@
+#include "io/doctor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "core/error.h"
+#include "io/doctor/color_check.h"
+#include "io/doctor/encoding_check.h"
+#include "io/doctor/file_check.h"
+#include "io/doctor/geometry_findings.h"
+#include "io/doctor/label_check.h"
+#include "io/doctor/proposal.h"
+#include "io/doctor/sample.h"
+#include "io/doctor/trajectory_check.h"
+#include "io/open_sequence.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+
+std::string number_text(double value, const char* format) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+bool Examination::faulty() const {
+  return std::any_of(findings.begin(), findings.end(), [](const Finding& finding) { return finding.faulty; });
+}
+
+namespace {
+
+void append(std::vector<Finding>& to, std::vector<Finding> from) {
+  to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+}
+
+/// Faces of one scan do not overlap, and its points say how long they are: there is nothing to compare.
+bool of_range_sensor(const SequenceListing& listing) {
+  return listing.frames.front().depth.codec == ImageSource::Codec::scan;
+}
+
+Examination begin(const SequenceListing& listing) {
+  Examination examination;
+  examination.layout = listing.layout;
+  examination.recorded_frames = int64_t(listing.frames.size());
+  return examination;
+}
+
+}  // namespace
+
+Examination examine_sequence(const fs::path& path, const SequenceOptions& options) {
+  SequenceListing listing = list_sequence(path, options);
+  Examination examination = begin(listing);
+  if (auto finding = check_stated_camera(listing)) examination.findings.push_back(std::move(*finding));
+  append(examination.findings, check_files(listing));
+  if (of_range_sensor(listing)) return examination;
+  append(examination.findings, check_depth_images(path, options, listing));
+
+  Sample sample = take_sample(path, options, listing, {});
+  examination.sampled_frames = int64_t(sample.geometry.frames.size());
+  examination.frame_pairs = int64_t(sample.geometry.pairs.size());
+  examination.skipped = sample.skipped;
+  if (sample.geometry.frames.empty())
+    throw FormatError(describe_mismatch(path.string(), "frames", "some that can be read", "none"));
+  const Reading best = best_reading(sample.geometry, true);
+  if (sample.geometry.pairs.size() >= 2) {
+    append(examination.findings, geometry_findings(sample.geometry, best, true));
+    examination.findings.push_back(check_trajectory(sample.geometry, best, *plain_reader(path, options, listing)));
+  }
+  if (auto finding = check_color_order(sample.geometry.frames, listing.classes))
+    examination.findings.push_back(std::move(*finding));
+  if (auto finding = check_labels(sample.geometry, best, listing.classes))
+    examination.findings.push_back(std::move(*finding));
+  examination.proposal = propose(sample.geometry, best);
+  return examination;
+}
+
+Examination examine_quickly(const fs::path& path, const SequenceOptions& options) {
+  const SequenceListing listing = list_sequence(path, options);
+  Examination examination = begin(listing);
+  if (of_range_sensor(listing)) return examination;
+  const SamplePlan plan{.clusters = 3, .offsets = {0, 2, 6}, .whole_below = 9, .images = true};
+  const Sample sample = take_sample(path, options, listing, plan);
+  examination.sampled_frames = int64_t(sample.geometry.frames.size());
+  examination.frame_pairs = int64_t(sample.geometry.pairs.size());
+  examination.skipped = sample.skipped;
+  if (sample.geometry.frames.empty()) return examination;
+  const Reading best = best_reading(sample.geometry, false);
+  append(examination.findings, geometry_findings(sample.geometry, best, false));
+  if (auto finding = check_color_order(sample.geometry.frames, listing.classes))
+    examination.findings.push_back(std::move(*finding));
+  examination.proposal = propose(sample.geometry, best);
+  return examination;
+}
+
+}  // namespace felt

@@ -1,0 +1,171 @@
+#include "io/doctor/encoding_check.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "io/doctor/sample.h"
+#include "io/image_decode.h"
+#include "io/text_input.h"
+
+namespace felt {
+namespace {
+
+/// Share of neighbours (side by side, and one above the other) that differ by more than a quarter.
+struct Roughness {
+  double across = 0, down = 0;
+};
+
+/// `width`: of the rows that the image's values are taken to form.
+Roughness roughness_of(const DepthImage& depth, int width) {
+  Roughness roughness;
+  double across = 0, down = 0;
+  const int height = int(depth.size()) / width;
+  const auto jumps = [](float a, float b) { return std::abs(a - b) > 0.25f * std::min(a, b); };
+  for (int v = 0; v + 1 < height; v += 2)
+    for (int u = 0; u + 1 < width; u += 2) {
+      const float* const here = depth.data() + size_t(v) * width + u;
+      if (here[0] > 0 && here[1] > 0) ++across, roughness.across += jumps(here[0], here[1]);
+      if (here[0] > 0 && here[width] > 0) ++down, roughness.down += jumps(here[0], here[width]);
+    }
+  roughness.across /= std::max(1.0, across);
+  roughness.down /= std::max(1.0, down);
+  return roughness;
+}
+
+/// Depth of a few frames spread over the sequence.
+std::vector<DepthImage> few_depths(const std::filesystem::path& path, const SequenceOptions& options,
+                                   const SequenceListing& listing) {
+  SequenceOptions depth_only = options;
+  depth_only.read_color = false;
+  SequenceListing bare = listing;
+  for (FrameRecord& frame : bare.frames) {
+    frame.color = frame.labels = frame.instances = frame.probabilities = {};
+    frame.masks.clear();
+    frame.class_maps.clear();
+  }
+  const auto reader = plain_reader(path, depth_only, std::move(bare));
+  std::vector<DepthImage> depths;
+  const int64_t step = std::max<int64_t>(1, reader->size() / 8);
+  for (int64_t i = 0; i < reader->size() && depths.size() < 4; i += step) {
+    ReadResult result = reader->read(i);
+    if (auto* frame = std::get_if<Frame>(&result)) depths.push_back(std::move(frame->depth_m));
+  }
+  return depths;
+}
+
+Roughness mean_roughness(const std::vector<DepthImage>& depths, bool swapped) {
+  Roughness mean;
+  for (const DepthImage& depth : depths) {
+    const Roughness one = roughness_of(depth, swapped ? depth.height() : depth.width());
+    mean.across += one.across / double(depths.size());
+    mean.down += one.down / double(depths.size());
+  }
+  return mean;
+}
+
+std::string percent(double share) { return number_text(100 * share, "%.2g") + " %"; }
+
+struct Size {
+  int width = 0, height = 0;
+  std::string text() const { return std::to_string(width) + " x " + std::to_string(height); }
+};
+
+/// Size of the first depth image whose header can be read; 0 x 0 where there is none, or images are in a container.
+Size depth_image_size(const SequenceListing& listing) {
+  for (const FrameRecord& frame : listing.frames) {
+    if (frame.depth.empty()) continue;
+    if (frame.depth.codec != ImageSource::Codec::image_file || frame.depth.bytes > 0) return {};
+    try {
+      const std::string bytes = read_whole_file(frame.depth.path);
+      const ImageHeader header =
+          read_image_header({reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()}, frame.depth.path.string());
+      return {header.width, header.height};
+    } catch (const Error&) {
+      continue;  // the next one; a sequence without any is refused where it is opened
+    }
+  }
+  return {};
+}
+
+std::string intrinsics_option(const Intrinsics& k) {
+  return "--intrinsics " + number_text(k.fx, "%.5g") + "," + number_text(k.fy, "%.5g") + "," +
+         number_text(k.cx, "%.5g") + "," + number_text(k.cy, "%.5g");
+}
+
+}  // namespace
+
+std::optional<Finding> check_stated_camera(SequenceListing& listing) {
+  const Size image = depth_image_size(listing), stated{listing.width, listing.height};
+  if (image.width == 0 || !listing.intrinsics) return std::nullopt;
+  Finding finding{"image-size", true, 0.98, "", "", ""};
+  Intrinsics& k = *listing.intrinsics;
+  const auto fits = [&](const Intrinsics& c) {
+    return c.cx > 0 && c.cy > 0 && c.cx < image.width && c.cy < image.height;
+  };
+  if (stated.width > 0 && (stated.width != image.width || stated.height != image.height)) {
+    listing.width = listing.height = 0;
+    finding.evidence = "the camera is stated for " + stated.text() + ", depth images are " + image.text();
+    if (stated.width == image.height && stated.height == image.width) {
+      finding.belief = "the camera states width and height exchanged";
+      // Was the rest of the camera exchanged too? The centre of the image tells.
+      const double as_is = std::hypot(k.cx - image.width / 2.0, k.cy - image.height / 2.0),
+                   exchanged = std::hypot(k.cy - image.width / 2.0, k.cx - image.height / 2.0);
+      if (exchanged < as_is) k = {k.fy, k.fx, k.cy, k.cx};
+    } else {
+      finding.belief = "the camera is that of images of another size";
+      const double sx = double(image.width) / stated.width, sy = double(image.height) / stated.height;
+      k = {k.fx * sx, k.fy * sy, (k.cx + 0.5) * sx - 0.5, (k.cy + 0.5) * sy - 0.5};
+    }
+    finding.remedy = intrinsics_option(k);
+    return finding;
+  }
+  if (fits(k)) return std::nullopt;
+  const Intrinsics exchanged{k.fy, k.fx, k.cy, k.cx};
+  if (!fits(exchanged)) return std::nullopt;
+  finding.belief = "the camera is that of an image with width and height exchanged";
+  finding.evidence = "the principal point " + number_text(k.cx, "%.5g") + ", " + number_text(k.cy, "%.5g") +
+                     " lies outside of " + image.text();
+  k = exchanged;
+  finding.remedy = intrinsics_option(k);
+  return finding;
+}
+
+std::vector<Finding> check_depth_images(const std::filesystem::path& path, const SequenceOptions& options,
+                                        SequenceListing& listing) {
+  const std::vector<DepthImage> now = few_depths(path, options, listing);
+  if (now.empty()) return {};
+  const Roughness as_read = mean_roughness(now, false), swapped = mean_roughness(now, true);
+  Finding encoding{"depth-encoding", false, 0.95, "depth is stored as plain numbers", "", ""};
+  if (listing.depth_encoding == DepthEncoding::rotated3)
+    encoding.belief = "depth is stored with its bits rotated by three";
+  encoding.evidence = percent(as_read.across) + " of neighbouring pixels differ by more than a quarter";
+
+  SequenceListing other = listing;
+  const bool rotated_now = listing.depth_encoding == DepthEncoding::rotated3;
+  other.depth_encoding = rotated_now ? DepthEncoding::plain : DepthEncoding::rotated3;
+  const std::vector<DepthImage> otherwise = few_depths(path, options, other);
+  const double other_across = otherwise.empty() ? 1 : mean_roughness(otherwise, false).across;
+  if (as_read.across > 0.25 && other_across < 0.4 * as_read.across) {
+    encoding.faulty = true;
+    encoding.belief = rotated_now ? "depth is stored as plain numbers"
+                                  : "the bits of depth are rotated by three (picking challenge, SUN RGB-D)";
+    encoding.evidence += ", but " + percent(other_across) + " read so";
+    encoding.remedy = rotated_now ? "--depth-encoding plain" : "--depth-encoding rotated3 --depth-scale 10000";
+    if (rotated_now != (listing.depth_scale == 10000)) other.depth_scale = rotated_now ? 1000 : 10000;
+    listing = other;
+    return {encoding};
+  }
+  if (as_read.down > 0.2 && swapped.down < 0.4 * as_read.down && now.front().width() != now.front().height()) {
+    Finding size{"image-size", true,
+                 0.9,          "rows of the depth images have another length: width and height are exchanged",
+                 "",           ""};
+    size.evidence = percent(as_read.down) + " of pixels differ by more than a quarter from the one below, but " +
+                    percent(swapped.down) + " in rows of " + std::to_string(now.front().height());
+    size.remedy = "write the images again with the right width";
+    return {encoding, size};
+  }
+  return {encoding};
+}
+
+}  // namespace felt

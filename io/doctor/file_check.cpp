@@ -1,0 +1,135 @@
+#include "io/doctor/file_check.h"
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <system_error>
+
+#include "io/recorded_pose.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+/// "3, 4, 9 and 12 more"
+std::string listed(const std::vector<int64_t>& numbers) {
+  constexpr size_t kNamed = 6;
+  std::string text;
+  for (size_t i = 0; i < std::min(kNamed, numbers.size()); ++i)
+    text += (i == 0 ? "" : ", ") + std::to_string(numbers[i]);
+  if (numbers.size() > kNamed) text += " and " + std::to_string(numbers.size() - kNamed) + " more";
+  return text;
+}
+
+uint64_t bytes_of(const ImageSource& source) {
+  if (source.empty() || source.bytes > 0) return source.bytes;
+  std::error_code fault;
+  const uintmax_t size = fs::file_size(source.path, fault);
+  return fault ? 0 : uint64_t(size);
+}
+
+/// True where both sources hold the same bytes.
+bool same_bytes(const ImageSource& a, const ImageSource& b) {
+  const uint64_t size = bytes_of(a);
+  if (size == 0 || size != bytes_of(b)) return false;
+  std::ifstream file_a(a.path, std::ios::binary), file_b(b.path, std::ios::binary);
+  file_a.seekg(std::streamoff(a.offset));
+  file_b.seekg(std::streamoff(b.offset));
+  char chunk_a[1 << 14], chunk_b[1 << 14];
+  for (uint64_t left = size; left > 0;) {
+    const auto count = std::streamsize(std::min<uint64_t>(left, sizeof chunk_a));
+    if (!file_a.read(chunk_a, count) || !file_b.read(chunk_b, count)) return false;
+    if (!std::equal(chunk_a, chunk_a + count, chunk_b)) return false;
+    left -= uint64_t(count);
+  }
+  return true;
+}
+
+Finding check_copies(const std::vector<FrameRecord>& frames) {
+  std::vector<int64_t> copies;
+  for (size_t i = 1; i < frames.size(); ++i)
+    if (same_bytes(frames[i - 1].depth, frames[i].depth) || same_bytes(frames[i - 1].color, frames[i].color))
+      copies.push_back(frames[i].index);
+  Finding finding{"duplicates", !copies.empty(), 0.99, "no image is a copy of the one before", "", ""};
+  finding.evidence = "files of " + std::to_string(frames.size()) + " frames compared";
+  if (copies.empty()) return finding;
+  finding.belief = std::to_string(copies.size()) + " frames repeat the image of the frame before";
+  finding.evidence = "equal bytes in frames " + listed(copies);
+  finding.remedy = "leave them out with --frames, or record again";
+  return finding;
+}
+
+/// Numbers that a regular numbering would have and this one lacks; empty where the numbering is not regular.
+std::vector<int64_t> numbers_missing(const std::vector<FrameRecord>& frames) {
+  std::map<int64_t, size_t> steps;
+  for (size_t i = 1; i < frames.size(); ++i) ++steps[frames[i].index - frames[i - 1].index];
+  std::vector<int64_t> missing;
+  if (frames.size() < 8) return missing;
+  const auto usual =
+      std::max_element(steps.begin(), steps.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (usual->second < 0.75 * double(frames.size() - 1)) return missing;
+  constexpr size_t kMost = 10000;
+  for (size_t i = 1; i < frames.size(); ++i)
+    for (int64_t n = frames[i - 1].index + usual->first; n < frames[i].index && missing.size() < kMost;
+         n += usual->first)
+      missing.push_back(n);
+  return missing;
+}
+
+Finding check_missing(const SequenceListing& listing) {
+  const std::vector<FrameRecord>& frames = listing.frames;
+  std::error_code fault;
+  std::map<std::string, int64_t> reasons;
+  std::vector<int64_t> without_depth;
+  for (const FrameRecord& frame : frames) {
+    const auto pose = recorded_pose(frame);
+    if (frame.depth.empty() || !fs::exists(frame.depth.path, fault))
+      without_depth.push_back(frame.index);
+    else if (const auto* problem = std::get_if<PoseProblem>(&pose); problem != nullptr)
+      ++reasons[problem->reason];
+    else if (!frame.fault.empty())
+      ++reasons[frame.fault];
+  }
+  const std::vector<int64_t> gaps = numbers_missing(frames);
+  const auto share = [&](const char* reason) {
+    return reasons.contains(reason) ? double(reasons.at(reason)) / double(frames.size()) : 0.0;
+  };
+  // Lost tracking and images without a partner belong to recording; more than that does not.
+  const bool many_poses_missing = share("missing pose") > 0.15 || share("non-finite pose") > 0.3;
+  const bool disordered = share("stamp out of order") > 0, unreadable = share("unreadable pose") > 0,
+             not_rigid = share("non-rigid pose") > 0, partnerless = share("missing colour image") > 0.3;
+  Finding finding{"frames",
+                  !without_depth.empty() || !gaps.empty() || many_poses_missing || disordered || unreadable ||
+                      not_rigid || partnerless,
+                  0.95,
+                  "all frames are there",
+                  "",
+                  ""};
+  finding.evidence = std::to_string(frames.size()) + " frames, numbers " + std::to_string(frames.front().index) +
+                     " to " + std::to_string(frames.back().index);
+  for (const auto& [reason, count] : reasons) finding.evidence += ", " + std::to_string(count) + " " + reason;
+  if (!without_depth.empty()) {
+    finding.belief = std::to_string(without_depth.size()) + " frames lack their depth image";
+    finding.evidence += "; frames " + listed(without_depth);
+  } else if (!gaps.empty()) {
+    finding.belief = std::to_string(gaps.size()) + " frames are missing from an otherwise regular numbering";
+    finding.evidence += "; numbers " + listed(gaps);
+  } else if (finding.faulty) {
+    finding.belief = "frames cannot be used for the reasons counted";
+  }
+  if (partnerless && listing.stamped)
+    finding.remedy = "--max-dt with a larger difference, or --color-offset where the clocks differ";
+  else if (finding.faulty)
+    finding.remedy =
+        "nothing needs to be done: these frames are skipped and counted; copy the recording again if they should be "
+        "there";
+  return finding;
+}
+
+}  // namespace
+
+std::vector<Finding> check_files(const SequenceListing& listing) {
+  return {check_missing(listing), check_copies(listing.frames)};
+}
+
+}  // namespace felt

@@ -1,0 +1,163 @@
+#include "io/doctor/geometry_findings.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace felt {
+namespace {
+
+std::string percent(double share) { return number_text(100 * share, "%.2g") + " %"; }
+
+/// Mean over pairs that see each other.
+struct Summary {
+  double meets = 0, residual = 0;
+};
+
+Summary summary_of(const std::vector<PairScore>& scores) {
+  Summary summary;
+  std::vector<double> meets, residuals;
+  for (const PairScore& score : scores) {
+    if (score.in_view < 0.05) continue;
+    meets.push_back(score.meets);
+    if (score.meets > 0) residuals.push_back(score.residual);
+  }
+  const auto median = [](std::vector<double>& values) {
+    if (values.empty()) return 0.0;
+    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+    return values[values.size() / 2];
+  };
+  return {median(meets), median(residuals)};
+}
+
+class Findings {
+public:
+  Findings(const GeometrySample& sample, const Reading& best) : sample_(sample), best_(best), scores_(scores(best)) {}
+
+  std::vector<PairScore> scores(const Reading& reading) const {
+    return cross_project(sample_.frames, sample_.pairs, sample_.trajectory, sample_.camera, reading);
+  }
+  /// Adds a finding on one component: `other` is the best reading with that component as it is read now (where `best`
+  /// differs in it) or as the likeliest alternative (where it does not).
+  void add(const std::string& topic, bool differs, const std::string& belief, const std::string& remedy,
+           const std::vector<Reading>& others, double least_gain = 0.08) {
+    Finding finding{topic, false, 0, belief, "", ""};
+    Comparison least;
+    std::vector<PairScore> rival;
+    for (const Reading& other : others) {
+      const std::vector<PairScore> candidate = scores(other);
+      const Comparison comparison = compare(candidate, scores_);
+      if (!rival.empty() && comparison.gain >= least.gain) continue;
+      least = comparison;
+      rival = candidate;
+    }
+    finding.confidence = std::clamp(least.confidence(), 0.5, 0.99);
+    finding.faulty = differs && convincing(least, least_gain);
+    const Summary mine = summary_of(scores_), theirs = summary_of(rival);
+    finding.evidence = std::to_string(least.won) + " of " + std::to_string(least.decided) +
+                       " frame pairs that tell fit better: " + percent(mine.meets) +
+                       " of points in view meet the other surface (" + percent(mine.residual) + " off), against " +
+                       percent(theirs.meets) + " (" + percent(theirs.residual) + " off)" +
+                       (differs ? " as read now" : " otherwise");
+    if (finding.faulty) finding.remedy = remedy;
+    list.push_back(finding);
+  }
+  const Reading& best() const { return best_; }
+
+  std::vector<Finding> list;
+
+private:
+  const GeometrySample& sample_;
+  Reading best_;
+  std::vector<PairScore> scores_;
+};
+
+Reading with_delay(Reading reading, double delay) {
+  reading.pose_delay = delay;
+  return reading;
+}
+Reading with_focal(Reading reading, double factor) {
+  reading.focal_factor = factor;
+  return reading;
+}
+
+}  // namespace
+
+std::vector<Finding> geometry_findings(const GeometrySample& sample, const Reading& best, bool thorough) {
+  Findings findings(sample, best);
+  const Reading& now = sample.now;
+
+  Reading other = best;
+  other.convention.world_to_camera ^= true;
+  findings.add("pose-convention", best.convention.world_to_camera != now.convention.world_to_camera,
+               best.convention.world_to_camera ? "poses are world-to-camera" : "poses are camera-to-world",
+               "--pose-convention " + to_string(best.convention), {other});
+  other = best;
+  other.convention.opengl_axes ^= true;
+  findings.add("camera-axes", best.convention.opengl_axes != now.convention.opengl_axes,
+               best.convention.opengl_axes ? "camera axes are OpenGL's (y up, z backward)"
+                                           : "camera axes are OpenCV's (y down, z forward)",
+               "--pose-convention " + to_string(best.convention), {other});
+
+  // Rival scales: the one read now where the best differs, else the other known ones.
+  const double scale = sample.depth_scale / best.depth_factor;
+  const bool scale_differs = std::abs(std::log(best.depth_factor)) > 0.05;
+  std::vector<Reading> scales;
+  for (const double known : kDepthScales) {
+    other = best;
+    other.depth_factor = scale_differs ? 1 : sample.depth_scale / known;
+    if (std::abs(std::log(other.depth_factor / best.depth_factor)) > 0.05) scales.push_back(other);
+    if (scale_differs) break;
+  }
+  if (scales.empty()) {
+    other.depth_factor = 1.3;
+    scales.push_back(other);
+  }
+  findings.add("depth-scale", scale_differs, "stored depth counts " + number_text(scale, "%.6g") + " a metre",
+               "--depth-scale " + number_text(scale, "%.6g"), scales);
+  other = best;
+  other.ray_length ^= true;
+  findings.add("depth-along", best.ray_length != now.ray_length,
+               best.ray_length ? "depth is the length of the ray" : "depth lies along the optical axis",
+               best.ray_length ? "--ray-length" : "--ray-length=false", {other});
+  if (!thorough && !best.swapped_camera) return findings.list;
+
+  const PinholeCamera camera = camera_of(sample.camera, best);
+  const std::string intrinsics = "--intrinsics " + number_text(camera.fx, "%.5g") + "," +
+                                 number_text(camera.fy, "%.5g") + "," + number_text(camera.cx, "%.5g") + "," +
+                                 number_text(camera.cy, "%.5g");
+  if (best.swapped_camera) {
+    other = best;
+    other.swapped_camera = false;
+    findings.add("image-size", true, "the camera is that of an image with width and height exchanged", intrinsics,
+                 {other});
+    // The principal point, by now in the middle of the image, says so too.
+    if (Finding& size = findings.list.back(); !size.faulty) size.faulty = true, size.remedy = intrinsics;
+  }
+  if (!thorough) return findings.list;
+  const bool focal_differs = std::abs(std::log(best.focal_factor)) > 0.06;
+  findings.add("focal-length", focal_differs,
+               "a focal length of " + number_text(camera.fx, "%.4g") + " pixels fits best (" +
+                   number_text(best.focal_factor, "%.3f") + " times the given)",
+               intrinsics,
+               focal_differs ? std::vector<Reading>{with_focal(best, 1)}
+                             : std::vector<Reading>{with_focal(best, best.focal_factor * 1.1),
+                                                    with_focal(best, best.focal_factor / 1.1)});
+  if (sample.trajectory.spacing > 0) {
+    const double spacing = sample.trajectory.spacing, delay = best.pose_delay;
+    const bool delay_differs = std::abs(delay) > (sample.stamped ? 0.025 : 0.15 * spacing);
+    const std::string unit = sample.stamped ? " s" : " frame numbers";
+    findings.add("stamp-offset", delay_differs,
+                 std::abs(delay) > 0 ? "poses fit best when taken " + number_text(std::abs(delay)) + unit +
+                                           (delay > 0 ? " later" : " earlier") + " than depth is stamped"
+                                     : "poses are those of the moments at which depth was taken",
+                 "--stamp-offset " + number_text(-delay),
+                 delay_differs
+                     ? std::vector<Reading>{with_delay(best, 0)}
+                     : std::vector<Reading>{with_delay(best, delay + spacing), with_delay(best, delay - spacing)},
+                 // Slow cameras gain little from right stamps, but sound recordings gain nothing from wrong ones.
+                 0.02);
+  }
+  return findings.list;
+}
+
+}  // namespace felt

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "io/doctor/geometry.h"
+#include "io/reader.h"
+#include "io/sequence_listing.h"
+
+namespace felt {
+
+/// How much of a sequence the doctor decodes: `clusters` places spread over it, at each the frames `offsets` after the
+/// place. A sequence of no more than `whole_below` frames is taken whole.
+struct SamplePlan {
+  int clusters = 8;
+  std::vector<int> offsets = {0, 1, 3, 9, 27};
+  int whole_below = 36;
+  bool images = true;  ///< colour and labels too
+};
+
+struct Sample {
+  GeometrySample geometry;
+  std::map<std::string, int64_t> skipped;  ///< sampled frames that could not be read, by reason
+  int64_t tried = 0;
+};
+
+/// Decodes the sample. `listing`: of all frames.
+Sample take_sample(const std::filesystem::path& path, const SequenceOptions& options, const SequenceListing& listing,
+                   const SamplePlan& plan);
+
+/// Poses of all frames that have one.
+RecordedTrajectory recorded_trajectory(const SequenceListing& listing);
+
+/// A reader of all frames of the listing, whose depth is not converted from ray length.
+std::unique_ptr<SequenceReader> plain_reader(const std::filesystem::path& path, const SequenceOptions& options,
+                                             SequenceListing listing);
+
+/// One decoded frame with its points; empty points where there are none.
+SampledFrame sampled_frame(Frame frame, int64_t position);
+
+}  // namespace felt

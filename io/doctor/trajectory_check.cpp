@@ -1,0 +1,128 @@
+#include "io/doctor/trajectory_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <set>
+
+#include "io/doctor/sample.h"
+
+namespace felt {
+namespace {
+
+/// A pair whose surfaces contradict each other, or that should see each other and does not.
+bool fits(const PairScore& score) { return score.in_view > 0.1 && score.meets > 0.4; }
+
+struct Step {
+  size_t from = 0;  ///< position in the trajectory
+  double turn_rad = 0, way_m = 0;
+};
+
+/// The largest steps by way and by turn, from frames that follow one another.
+std::vector<size_t> largest_steps(const RecordedTrajectory& trajectory) {
+  constexpr size_t kTried = 6;
+  std::vector<Step> steps;
+  for (size_t i = 0; i + 1 < trajectory.recorded.size(); ++i) {
+    if (trajectory.stamp[i + 1] - trajectory.stamp[i] > 1.5 * trajectory.spacing) continue;
+    const Eigen::Isometry3d move = trajectory.recorded[i].inverse() * trajectory.recorded[i + 1];
+    steps.push_back({i, Eigen::AngleAxisd(move.linear()).angle(), move.translation().norm()});
+  }
+  std::set<size_t> chosen;
+  for (double Step::*size : {&Step::way_m, &Step::turn_rad}) {
+    std::stable_sort(steps.begin(), steps.end(), [&](const Step& a, const Step& b) { return a.*size > b.*size; });
+    for (size_t i = 0; i < std::min(kTried, steps.size()); ++i) chosen.insert(steps[i].from);
+  }
+  return {chosen.begin(), chosen.end()};
+}
+
+/// Median distance between frames `apart` positions apart, as a share of the median between any two.
+double smoothness(const RecordedTrajectory& trajectory) {
+  std::vector<double> near, any;
+  const size_t count = trajectory.recorded.size();
+  const auto distance = [&](size_t a, size_t b) {
+    const Eigen::Isometry3d move = trajectory.recorded[a].inverse() * trajectory.recorded[b];
+    return move.translation().norm() + Eigen::AngleAxisd(move.linear()).angle();
+  };
+  for (size_t i = 0; i + 1 < count; ++i) {
+    near.push_back(distance(i, i + 1));
+    any.push_back(distance(i, (i + 1 + (i * 7919) % (count - 1)) % count));
+  }
+  const auto middle = [](std::vector<double>& v) {
+    std::nth_element(v.begin(), v.begin() + v.size() / 2, v.end());
+    return v[v.size() / 2];
+  };
+  return near.empty() ? 0 : middle(near) / std::max(1e-9, middle(any));
+}
+
+/// Frames of trajectory positions [first, last], decoded; nothing for those that cannot be read.
+std::vector<SampledFrame> decode(const RecordedTrajectory& trajectory, size_t first, size_t last,
+                                 const SequenceReader& reader) {
+  std::vector<SampledFrame> frames;
+  for (size_t i = first; i <= last; ++i) {
+    ReadResult result = reader.read(trajectory.position[i]);
+    if (auto* frame = std::get_if<Frame>(&result))
+      frames.push_back(sampled_frame(std::move(*frame), trajectory.position[i]));
+  }
+  return frames;
+}
+
+}  // namespace
+
+Finding check_trajectory(const GeometrySample& sample, const Reading& best, const SequenceReader& reader) {
+  Finding finding{"trajectory", false, 0.9, "the trajectory is continuous and fits the images", "", ""};
+  const RecordedTrajectory& trajectory = sample.trajectory;
+  std::map<int, Pair> nearest;
+  for (const Pair& pair : sample.pairs)
+    if (const auto [at, is_new] = nearest.emplace(pair.a, pair); !is_new && pair.b < at->second.b) at->second = pair;
+  std::vector<Pair> neighbours;
+  for (const auto& [a, pair] : nearest) neighbours.push_back(pair);
+  const std::vector<PairScore> scores = cross_project(sample.frames, neighbours, trajectory, sample.camera, best);
+  const auto fitting = double(std::count_if(scores.begin(), scores.end(), fits));
+  const double share = scores.empty() ? 1 : fitting / double(scores.size());
+  finding.evidence = std::to_string(int(fitting)) + " of " + std::to_string(scores.size()) +
+                     " neighbouring frame pairs see the same surface";
+  if (scores.size() >= 3 && share < 0.5) {
+    const double rough = smoothness(trajectory);
+    finding.faulty = true;
+    finding.confidence = std::min(0.97, 1 - share);
+    finding.belief =
+        rough > 0.5 ? "poses are in another order than the images (shuffled)" : "poses do not belong to these images";
+    finding.evidence +=
+        "; a step of the trajectory is " + number_text(100 * rough, "%.0f") + " % of the way between any two poses";
+    finding.remedy = "no option mends it: take poses and images of the same recording, in the same order";
+    return finding;
+  }
+  std::vector<int64_t> jumps;
+  for (const size_t from : largest_steps(trajectory)) {
+    const size_t first = from > 0 ? from - 1 : from, last = std::min(from + 2, trajectory.recorded.size() - 1);
+    const std::vector<SampledFrame> frames = decode(trajectory, first, last, reader);
+    if (frames.size() < last - first + 1 || frames.size() < 3) continue;
+    std::vector<Pair> pairs;
+    for (int i = 0; i + 1 < int(frames.size()); ++i) pairs.push_back({i, i + 1});
+    const std::vector<PairScore> around = cross_project(frames, pairs, trajectory, sample.camera, best);
+    const size_t across = from - first;
+    // Score of a point in view: a quarter of a room's surfaces meet themselves after any jump.
+    const auto per_point = [](const PairScore& score) { return score.score / std::max(0.01, score.in_view); };
+    bool others_fit = true;
+    double worst_other = per_point(around[across == 0 ? 1 : 0]);
+    for (size_t i = 0; i < around.size(); ++i) {
+      if (i == across) continue;
+      others_fit &= fits(around[i]);
+      worst_other = std::min(worst_other, per_point(around[i]));
+    }
+    if (others_fit && (around[across].in_view < 0.05 || per_point(around[across]) < 0.5 * worst_other))
+      jumps.push_back(trajectory.index[from + 1]);
+  }
+  if (jumps.empty()) return finding;
+  finding.faulty = true;
+  finding.confidence = 0.9;
+  finding.belief = "the trajectory jumps at frame " + std::to_string(jumps.front());
+  for (size_t i = 1; i < jumps.size(); ++i) finding.belief += ", " + std::to_string(jumps[i]);
+  finding.evidence = "surfaces fit on both sides of each jump, but not across it";
+  finding.remedy = "reconstruct the parts on their own with --frames";
+  return finding;
+}
+
+}  // namespace felt
