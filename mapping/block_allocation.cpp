@@ -66,11 +66,11 @@ std::vector<BlockCoord> marked_blocks(const std::vector<uint8_t>& marks, const V
   return blocks;
 }
 
-/// Distance in pixels between the pixels of a tile that are looked at: a quarter of a block on the tile's farthest
+/// Distance in pixels between the pixels of a tile that are looked at: an eighth of a block on the tile's farthest
 /// surface, half of that where the tile sees more than one surface.
-int stride_in_tile(const DepthRange& tile, float quarter_block_px, float truncation_m) {
+int stride_in_tile(const DepthRange& tile, float eighth_block_px, float truncation_m) {
   const float farthest_m = -tile.minus_farthest_m;
-  float apart_px = quarter_block_px / farthest_m;
+  float apart_px = eighth_block_px / farthest_m;
   if (farthest_m - tile.nearest_m > truncation_m) apart_px *= 0.5f;
   int stride = DepthTiles::kFinestTile;
   while (stride > 1 && float(stride) > apart_px) stride /= 2;
@@ -79,7 +79,7 @@ int stride_in_tile(const DepthRange& tile, float quarter_block_px, float truncat
 
 /// Marks the cells that a row of the finest tiles sees.
 void mark_tile_row(const DepthImage& depth_m, float min_depth_m, float max_depth_m, const DepthRange* tiles,
-                   int columns, int tile_row, float quarter_block_px, float truncation_m, const AllocationView& view,
+                   int columns, int tile_row, float eighth_block_px, float truncation_m, const AllocationView& view,
                    uint8_t* cells) {
   constexpr int kTile = DepthTiles::kFinestTile, kAtOnce = RowSamples::kMost / kTile, kStrides = 4;
   std::array<int, kAtOnce> columns_of[kStrides];  // by logarithm of the stride
@@ -88,7 +88,7 @@ void mark_tile_row(const DepthImage& depth_m, float min_depth_m, float max_depth
     int count[kStrides] = {};
     for (int c = first; c < std::min(columns, first + kAtOnce); ++c) {
       if (tiles[c].nearest_m > max_depth_m) continue;
-      const int log = std::countr_zero(unsigned(stride_in_tile(tiles[c], quarter_block_px, truncation_m)));
+      const int log = std::countr_zero(unsigned(stride_in_tile(tiles[c], eighth_block_px, truncation_m)));
       columns_of[log][size_t(count[log]++)] = c;
     }
     for (int y = 0; y < std::min(kTile, depth_m.height() - tile_row * kTile); ++y) {
@@ -165,12 +165,12 @@ std::vector<BlockCoord> blocks_in_view(const DepthImage& depth_m, const PinholeC
     view.origin[c] = float((T_world_camera.translation()[c] / voxel_size_m + 0.5) / kBlockDim - box.lowest[c]);
     view.cells[c] = int(box.cells[c]);
   }
-  const auto quarter_block_px = float(0.25 * block_m * std::max(camera.fx, camera.fy));  // at one metre
+  const auto eighth_block_px = float(0.125 * block_m * std::max(camera.fx, camera.fy));  // at one metre
   // Depth is marked while the survey has it at hand.
   tbb::parallel_for(all_tile_rows, [&](const tbb::blocked_range<int>& range) {
     for (int tile_row = range.begin(); tile_row < range.end(); ++tile_row) {
       if (!fitted) survey(tile_row);
-      mark_tile_row(depth_m, min_depth_m, max_depth_m, finest.row(tile_row), finest.columns, tile_row, quarter_block_px,
+      mark_tile_row(depth_m, min_depth_m, max_depth_m, finest.row(tile_row), finest.columns, tile_row, eighth_block_px,
                     float(truncation_m), view, scratch.cells.data());
     }
   });
