@@ -46,7 +46,7 @@ struct TouchedFloor {
   TouchedFloor() {
     Map floor = labelled_map(
         0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
-        class_table({"wood", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 2; });
+        class_table({"wood", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 0 : 1; });
     Property friction;
     friction.name = "friction";
     friction.priors = {{"wood", {0.4, 0.05, 50}}, {"ice", {0.1, 0.03, 50}}};
