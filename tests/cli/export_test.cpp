@@ -74,6 +74,29 @@ std::set<std::tuple<int, int, int>> colors_of(const TriangleMesh& mesh) {
 
 }  // namespace
 
+TEST_CASE("an HTML page holds the map's mesh and asks for nothing else") {
+  const TouchedFloor floor;
+  const fs::path page = floor.directory.path() / "floor.html";
+  const json written = floor.exported("--html " + quoted(page) + " --color-by friction.mean --up -y");
+  CHECK(written["html"]["path"] == page.string());
+  CHECK(written["html"]["bytes"] == fs::file_size(page));
+  std::ifstream in(page);
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  CHECK(text.starts_with("<!DOCTYPE html>"));
+  for (const char* outside : {"http:", "https:", "src=", "import ", "fetch("}) {
+    INFO(outside);
+    CHECK(text.find(outside) == std::string::npos);
+  }
+  const std::string opening = "<script id=\"scene\" type=\"application/json\">";
+  const size_t begin = text.find(opening) + opening.size();
+  const json scene = json::parse(text.substr(begin, text.find("</script>", begin) - begin));
+  CHECK(scene["vertices"] > 1000);
+  CHECK(scene["up"] == "-y");
+  CHECK(scene["low"][0].get<double>() == Approx(-0.4).margin(0.03));
+  CHECK(run_feltmap("export --force " + quoted(floor.map) + " --html " + quoted(page) + " --up sideways").exit_code ==
+        2);
+}
+
 TEST_CASE("a GLB file is what a reader that is not ours expects, for every kind of colour") {
   const TouchedFloor floor;
   for (const char* color : {"rgb", "class", "entropy", "friction.mean", "friction.sd"}) {
