@@ -38,6 +38,9 @@ struct LabelExperiment {
   int touches = 0;         ///< of a region (`suggested`, `at_random`: on average)
   double true_rho = 0;     ///< correlation of the readings of a region
   double assumed_rho = 0;  ///< what the model thinks it is
+  /// The paper's Algorithm 1 read literally: the class is that of the largest projected concentration, from the paper's
+  /// vision prior.
+  bool projected_concentrations = false;
   /// Whether a reading changes what the next one is compared with. Algorithm 1 as printed never feeds the updated
   /// parameters back: several readings then weigh as the product of their evidences under the prior.
   bool fed_back = true;
@@ -48,6 +51,7 @@ struct LabelOutcome {
   int regions = 0;  ///< of each class
   CalibrationScores calibration;
   double binary_cross_entropy = 0;  ///< mean over regions and classes, nats
+  std::vector<uint8_t> right;       ///< region by region
   double macro() const;
   double macro_error() const;  ///< standard error
   /// Peak signal-to-noise ratio of the class probabilities against the truth, dB.
@@ -58,11 +62,11 @@ struct LabelOutcome {
 /// compared in pairs. In parallel; the same for any number of threads.
 LabelOutcome simulate_labels(const LabelExperiment& experiment, int regions_per_class);
 
-/// Share of regions that one experiment gets right and the other does not, less the other way round, and its standard
+/// Share of regions that one outcome has right and the other has not, less the other way round, with its standard
 /// error.
 struct PairedDifference {
   double difference = 0, error = 0;
 };
-PairedDifference compare(const LabelExperiment& better, const LabelExperiment& worse, int regions_per_class);
+PairedDifference compare(const LabelOutcome& better, const LabelOutcome& worse);
 
 }  // namespace felt::paper
