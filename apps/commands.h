@@ -25,6 +25,7 @@ void add_merge(CLI::App& app);
 void add_diff(CLI::App& app);
 void add_verify(CLI::App& app);
 void add_infer(CLI::App& app);
+void add_bench(CLI::App& app);
 void add_simulate(CLI::App& app);
 
 }  // namespace felt::apps

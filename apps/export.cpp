@@ -25,25 +25,28 @@ namespace fs = std::filesystem;
 using json = nlohmann::ordered_json;
 
 struct ExportOptions : CommonOptions {
-  fs::path map, vdb, mesh, points;
-  std::string color_by = "rgb", class_name, segment_at, properties;
+  fs::path map, vdb, mesh, points, html;
+  std::string color_by = "rgb", class_name, segment_at, properties, up = "+z";
   std::vector<double> box_m;  ///< x0 y0 z0 x1 y1 z1
   std::vector<std::string> grids;
-  bool half = false, overwrite = false;
+  bool half = false, compact = false, overwrite = false;
   RegionOptions segment;
 };
 
 void check(const ExportOptions& o) {
   std::vector<std::string> problems;
-  if (o.vdb.empty() && o.mesh.empty() && o.points.empty())
-    problems.push_back(describe_mismatch("export", "what to write", "--vdb, --mesh or --points", "none of them"));
-  if (o.vdb.empty() && (o.half || !o.grids.empty()))
-    problems.push_back(describe_mismatch("--grids, --half", "what to write", "--vdb FILE", "no --vdb"));
+  if (o.vdb.empty() && o.mesh.empty() && o.points.empty() && o.html.empty())
+    problems.push_back(
+        describe_mismatch("export", "what to write", "--vdb, --mesh, --points or --html", "none of them"));
+  if (o.vdb.empty() && (o.half || o.compact || !o.grids.empty()))
+    problems.push_back(describe_mismatch("--grids, --half, --compact", "what to write", "--vdb FILE", "no --vdb"));
+  if (o.compact && (o.half || !o.grids.empty()))
+    problems.push_back(describe_mismatch("--compact", "a map file", "neither --grids nor --half", "one of them"));
   if (!o.box_m.empty() && !(o.box_m[0] < o.box_m[3] && o.box_m[1] < o.box_m[4] && o.box_m[2] < o.box_m[5]))
     problems.push_back(describe_mismatch("--box", "corners in metres", "x0,y0,z0,x1,y1,z1 with x0 < x1 and so on",
                                          nlohmann::json(o.box_m).dump()));
   if (!problems.empty()) throw ConfigError(problems);
-  for (const fs::path& file : {o.vdb, o.mesh, o.points})
+  for (const fs::path& file : {o.vdb, o.mesh, o.points, o.html})
     if (!file.empty() && fs::exists(file) && !o.overwrite)
       throw IoError(
           describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", "one"));
@@ -79,7 +82,7 @@ json write_vdb(const Map& map, const Region* part, const ExportOptions& o) {
     const Map& whole = map;
     const Map some = part == nullptr ? Map(map.voxel_size_m, map.truncation_m) : cropped(map, *part);
     const Map& saved = part == nullptr ? whole : some;
-    save_map(saved, o.vdb);
+    save_map(saved, o.vdb, o.compact ? SaveOptions{MapCompression::zip, false} : SaveOptions{});
     written["active_voxels"] = active_voxel_count(saved);
   } else {
     written["grids"] = export_vdb(map, o.vdb, {.grids = o.grids, .half = o.half, .part = part});
@@ -104,6 +107,10 @@ json write_surface(const Map& map, const Region* part, const ExportOptions& o) {
     written["mesh"] = {
         {"path", o.mesh.string()}, {"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}};
   }
+  if (!o.html.empty()) {
+    write_html(o.html, mesh, o.map.string() + (o.color_by == "rgb" ? "" : ", " + o.color_by), o.up);
+    written["html"] = {{"path", o.html.string()}, {"bytes", fs::file_size(o.html)}};
+  }
   if (!o.points.empty()) {
     mesh.triangles.clear();
     mesh.triangle_scalars.clear();
@@ -121,7 +128,8 @@ int run(const ExportOptions& o) {
   const std::optional<Region> part = part_of_map(map, o);
   json written = json::object();
   if (!o.vdb.empty()) written["vdb"] = write_vdb(map, part ? &*part : nullptr, o);
-  if (!o.mesh.empty() || !o.points.empty()) written.update(write_surface(map, part ? &*part : nullptr, o));
+  if (!o.mesh.empty() || !o.points.empty() || !o.html.empty())
+    written.update(write_surface(map, part ? &*part : nullptr, o));
   if (o.json) {
     std::printf("%s\n", written.dump(2).c_str());
   } else if (!o.quiet) {
@@ -144,6 +152,7 @@ void add_export(CLI::App& app) {
                                   {"export", "Write meshes, points and grids of a map or a part of it",
                                    "feltmap export result/map.vdb --mesh sofa.glb --class sofa\n"
                                    "feltmap export result/map.vdb --mesh felt.glb --color-by friction.mean\n"
+                                   "feltmap export result/map.vdb --html map.html --color-by class\n"
                                    "feltmap export result/map.vdb --points door.ply --segment-at 1.2,0.4,1.0\n"
                                    "feltmap export result/map.vdb --vdb part.vdb --box 0,0,0,2,2,1.5\n"
                                    "feltmap export result/map.vdb --vdb view.vdb --grids tsdf,color,evidence/ --half"},
@@ -151,11 +160,16 @@ void add_export(CLI::App& app) {
   command.add_option("MAP", o->map, "A map file")->required();
   command.add_option("--mesh", o->mesh, "Surface mesh, by extension: .ply, .glb or .obj");
   command.add_option("--points", o->points, "The mesh's vertices with normals and colours: .ply");
+  command.add_option("--html", o->html, "A page that shows the mesh in a browser, without a network");
+  command.add_option("--up", o->up, "Axis of the map that points up on that page at first: +x, -x, +y, ... -z")
+      ->check(CLI::IsMember({"+x", "-x", "+y", "-y", "+z", "-z"}))
+      ->capture_default_str();
   command.add_option("--vdb", o->vdb, "Map file of the part; with --grids or --half a file of grids for viewing");
   command.add_option("--grids", o->grids, "Grids to write, by name; evidence/ stands for all that begin so")
       ->delimiter(',')
       ->option_text("NAME,...");
   command.add_flag("--half", o->half, "Store floats in 16 bits");
+  command.add_flag("--compact", o->compact, "A map file of least size: DEFLATE, and no grids that only viewers need");
   command.add_option("--color-by", o->color_by, "rgb, class, entropy, <property>.mean or <property>.sd")
       ->capture_default_str();
   command.add_option("--properties", o->properties, "Property table (YAML), for a map that has none");

@@ -8,10 +8,13 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/reading_options.h"
 #include "core/error.h"
 #include "io/map_file.h"
 #include "io/map_grids.h"
 #include "io/open_sequence.h"
+#include "io/picture.h"
+#include "io/sequence_picture.h"
 #include "mapping/crop.h"
 
 namespace felt::apps {
@@ -111,11 +114,25 @@ void print_lines(const Json& json, const std::string& indent) {
   }
 }
 
-int run(const fs::path& path, const SequenceOptions& options, bool with_grids, const CommonOptions& common) {
+/// `thumbnails.png` and `trajectory.png` of a sequence.
+void write_pictures(const fs::path& path, const SequenceOptions& options, const fs::path& folder) {
+  std::error_code fault;
+  fs::create_directories(folder, fault);
+  if (fault) throw IoError(folder.string() + ": cannot be made: " + fault.message());
+  write_png(folder / "thumbnails.png", thumbnail_sheet(*open_sequence(path, options)));
+  write_png(folder / "trajectory.png", trajectory_picture(list_sequence(path, options)));
+}
+
+int run(const fs::path& path, const ReadingArguments& reading, bool with_grids, const fs::path& pictures,
+        const CommonOptions& common) {
   if (!fs::exists(path))
     throw IoError(describe_mismatch(path.string(), "what to describe", "a map file or a sequence", "nothing there"));
   const bool is_map = fs::is_regular_file(path) && path.extension() == ".vdb";
+  if (is_map && !pictures.empty())
+    throw ConfigError(describe_mismatch("--pictures", "what to describe", "a sequence", path.string()));
+  const SequenceOptions options = resolve(reading);
   const Json json = is_map ? describe_map(path, with_grids) : describe_sequence(path, options);
+  if (!pictures.empty()) write_pictures(path, options, pictures);
   if (common.json) {
     std::printf("%s\n", json.dump(2).c_str());
   } else {
@@ -129,17 +146,21 @@ int run(const fs::path& path, const SequenceOptions& options, bool with_grids, c
 void add_info(CLI::App& app) {
   struct Arguments {
     fs::path path;
-    SequenceOptions options;
+    ReadingArguments reading;
+    fs::path pictures;
     bool grids = false;
     CommonOptions common;
   };
   auto a = std::make_shared<Arguments>();
-  CLI::App& command = add_command(
-      app, {"info", "Say what a map or a sequence holds", "feltmap info result/map.vdb\nfeltmap info recording --json"},
-      a->common, [a] { return run(a->path, a->options, a->grids, a->common); });
+  CLI::App& command =
+      add_command(app,
+                  {"info", "Say what a map or a sequence holds",
+                   "feltmap info result/map.vdb\nfeltmap info recording --json --pictures looks"},
+                  a->common, [a] { return run(a->path, a->reading, a->grids, a->pictures, a->common); });
   command.add_option("PATH", a->path, "A map file, or a folder (or .sens file) of a recorded sequence")->required();
   command.add_flag("--grids", a->grids, "Of a map also every grid: active voxels, least, greatest and mean value");
-  command.add_option("--format", a->options.format, "Layout of the sequence, where detection is wrong");
+  command.add_option("--pictures", a->pictures, "Folder for thumbnails.png and trajectory.png of a sequence");
+  add_reading_options(command, a->reading);
 }
 
 }  // namespace felt::apps

@@ -19,7 +19,7 @@ double short_decimal(float value) {
 }  // namespace
 
 void add_label_options(CLI::App& command, LabelSettings& s) {
-  const LabelConfig standard;
+  const LabelConfig standard = standard_labels();
   const auto bracketed = [](float value) { return " [" + nlohmann::json(short_decimal(value)).dump() + "]"; };
   const char* group = "Labels";
   command
@@ -60,7 +60,15 @@ void add_label_options(CLI::App& command, LabelSettings& s) {
   command.add_flag("--instances{true}", s.instances, "Keep the instance id of every voxel")->group(group);
 }
 
-LabelConfig label_config(const LabelSettings& settings, LabelConfig config) {
+LabelConfig standard_labels() {
+  LabelConfig config;
+  // Beyond about 55 frames a touch can no longer correct a network that was wrong all along.
+  config.max_evidence = 50;
+  return config;
+}
+
+LabelConfig label_config(const LabelSettings& settings) {
+  LabelConfig config = standard_labels();
   const auto choose = [](float& value, const std::optional<double>& given) {
     if (given) value = float(*given);
   };

@@ -14,8 +14,10 @@ namespace felt::apps {
 /// The options about labels of commands that fuse a sequence.
 void add_label_options(CLI::App& command, LabelSettings& settings);
 
-/// The numbers of the settings, where given, over `config`.
-LabelConfig label_config(const LabelSettings& settings, LabelConfig config = {});
+/// What commands do unless told otherwise: docs/semantics.md says why.
+LabelConfig standard_labels();
+/// The numbers of the settings, where given, over the standard ones.
+LabelConfig label_config(const LabelSettings& settings);
 
 /// The settings as used, for the report and the map.
 void add_to_json(const LabelSettings& settings, const LabelConfig& config, nlohmann::ordered_json& json);

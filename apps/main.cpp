@@ -42,6 +42,7 @@ void add_commands(CLI::App& app) {
   add_diff(app);
   add_verify(app);
   add_infer(app);
+  add_bench(app);
   app.footer("Each command explains itself, with an example: feltmap <command> --help");
 }
 

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "core/error.h"
+#include "io/pose_list.h"
 
 namespace felt::apps {
 
@@ -12,12 +13,18 @@ void add_reading_options(CLI::App& command, ReadingArguments& a) {
   command.add_option("--format", a.format, "Layout: 7scenes, tum, replica, generic, ...")->group(reading);
   command.add_option("--frames", a.frames, "Frames a:b:step in recorded order, counted from 0")->group(reading);
   command.add_option("--intrinsics", a.intrinsics, "fx,fy,cx,cy of the depth image, pixels")->group(reading);
+  command.add_option("--distortion", a.distortion, "k1,k2,p1,p2[,k3] of the depth image's lens (radial-tangential)")
+      ->group(reading);
   command.add_option("--depth-scale", a.depth_scale, "Stored depth units per metre")->group(reading);
   command.add_option("--depth-encoding", a.depth_encoding, "plain, or rotated3 (16 bits rotated left by 3)")
       ->group(reading);
   command.add_flag("--ray-length,!--no-ray-length", a.ray_length, "Depth is the length of the ray, not z")
       ->group(reading);
   command.add_option("--pose-convention", a.pose_convention, "c2w or w2c, opencv or opengl; for example w2c,opengl")
+      ->group(reading);
+  command
+      .add_option("--body-camera", a.body_camera,
+                  "Pose of the camera on the body whose poses are recorded: tx ty tz qx qy qz qw, or 12 or 16 numbers")
       ->group(reading);
   command.add_option("--max-dt", a.max_dt_s, "Largest difference of stamps within a frame, seconds")->group(reading);
   command
@@ -49,6 +56,14 @@ SequenceOptions resolve(const ReadingArguments& a, SequenceOptions reading, std:
   if (!a.classes.empty()) reading.classes_file = a.classes;
   attempt(a.frames, [&] { reading.frames = parse_frame_selection(a.frames, "--frames"); });
   attempt(a.intrinsics, [&] { reading.intrinsics = parse_intrinsics(a.intrinsics, "--intrinsics"); });
+  attempt(a.distortion, [&] { reading.distortion = parse_distortion(a.distortion, "--distortion"); });
+  attempt(a.body_camera, [&] {
+    try {
+      reading.T_body_camera = parse_pose(a.body_camera, "--body-camera");
+    } catch (const FormatError& fault) {
+      throw ConfigError(fault.what());
+    }
+  });
   attempt(a.pose_convention,
           [&] { reading.pose_convention = parse_pose_convention(a.pose_convention, "--pose-convention"); });
   attempt(a.depth_encoding,

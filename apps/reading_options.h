@@ -18,6 +18,7 @@ struct ReadingArguments {
   std::optional<bool> ray_length;
   bool no_color = false, bgr = false;
   std::optional<double> stamp_offset;
+  std::string distortion, body_camera;
   int label_offset = 0;
 };
 

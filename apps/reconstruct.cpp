@@ -200,6 +200,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   common.threads = options.threads;
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(common.thread_count()));
   auto sequence = open_sequence(options.sequence, options.reading);
+  adopt_sequence_defaults(sequence->info(), options);
   const Perception perception = perception_of(options.perception, sequence->info().classes);
   const PreparedClasses classes = prepare_classes(options.labels, perception.classes(sequence->info()));
   const TouchPlan touches = plan_touches(options, *sequence, classes.table);

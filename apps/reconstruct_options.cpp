@@ -80,7 +80,10 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
       ->option_text("FILE");
 
   const char* map = "Map";
-  command.add_option("--voxel-size", a.voxel_size_m, "Edge of a voxel, metres [0.02]")->group(map);
+  command
+      .add_option("--voxel-size", a.voxel_size_m,
+                  "Edge of a voxel, metres [0.02; what suits the sensor for some layouts: docs/datasets.md]")
+      ->group(map);
   command.add_option("--truncation", a.truncation, "Band around the surface: metres, or voxels as 4vox [4vox]")
       ->group(map);
   command.add_option("--min-depth", a.min_depth_m, "Nearer depth is not used, metres [0.1]")->group(map);
@@ -137,12 +140,14 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   if (!a.perception.net.empty())
     problems.expect(reading.read_color, "--segmenter", "colour", "colour images to look at", "--no-color");
 
+  options.voxel_size_given = a.voxel_size_m || file.voxel_size_m;
+  options.max_depth_given = a.max_depth_m || file.max_depth_m;
   options.voxel_size_m = a.voxel_size_m.value_or(file.voxel_size_m.value_or(options.voxel_size_m));
   problems.expect(positive(options.voxel_size_m), "--voxel-size", "edge of a voxel in metres", "a number above 0",
                   text_of(options.voxel_size_m));
   problems.attempt([&] {
-    const std::string truncation = a.truncation.empty() ? file.truncation.value_or("4vox") : a.truncation;
-    options.truncation_m = parse_truncation(truncation, options.voxel_size_m, "--truncation");
+    options.truncation = a.truncation.empty() ? file.truncation.value_or("4vox") : a.truncation;
+    options.truncation_m = parse_truncation(options.truncation, options.voxel_size_m, "--truncation");
     if (positive(options.voxel_size_m) && !(options.truncation_m >= options.voxel_size_m))
       throw ConfigError(describe_mismatch("--truncation", "band around the surface", "at least one voxel",
                                           text_of(options.truncation_m) + " m"));
@@ -171,6 +176,14 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   reading.read_instances = fusion.labels.instances || a.perception.vote == SegmentSource::instances;
   problems.throw_if_any();
   return options;
+}
+
+void adopt_sequence_defaults(const SequenceInfo& info, ReconstructOptions& options) {
+  if (info.voxel_size_m > 0 && !options.voxel_size_given) {
+    options.voxel_size_m = info.voxel_size_m;
+    options.truncation_m = parse_truncation(options.truncation, options.voxel_size_m, "--truncation");
+  }
+  if (info.max_depth_m > 0 && !options.max_depth_given) options.fusion.max_depth_m = float(info.max_depth_m);
 }
 
 nlohmann::ordered_json to_json(const ReconstructOptions& options) {

@@ -8,6 +8,7 @@
 #include "apps/perception_options.h"
 #include "apps/reading_options.h"
 #include "io/label_settings.h"
+#include "io/reader.h"
 #include "io/sequence_options.h"
 #include "mapping/integration_config.h"
 
@@ -20,6 +21,8 @@ struct ReconstructOptions {
   std::filesystem::path properties, touches;  ///< empty: what the sequence carries, if anything
   double voxel_size_m = 0.02;
   double truncation_m = 0.08;
+  std::string truncation = "4vox";                         ///< as given
+  bool voxel_size_given = false, max_depth_given = false;  ///< else the sequence may know better
   IntegrationConfig fusion;
   PerceptionArguments perception;
   LabelSettings labels;
@@ -48,6 +51,9 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& arguments)
 /// Defaults, then the configuration file, then the command line (`threads`: its --threads, 0 where not given); checked
 /// together. Throws ConfigError with every problem at once.
 ReconstructOptions resolve(const ReconstructArguments& arguments, int threads);
+
+/// Takes over what the sequence's sensor asks for where the user said nothing.
+void adopt_sequence_defaults(const SequenceInfo& info, ReconstructOptions& options);
 
 /// The settings as used, for the report and the map.
 nlohmann::ordered_json to_json(const ReconstructOptions& options);

@@ -21,7 +21,9 @@ void batch_digamma(std::span<const float> x, std::span<float> out) noexcept;
 void batch_trigamma(std::span<const float> x, std::span<float> out) noexcept;
 /// D(x) = ln x - digamma(x): relative error below 1e-6.
 void batch_log_minus_digamma(std::span<const float> x, std::span<float> out) noexcept;
-/// x with D(x) = s: relative error below 1e-5 (one step from Minka's closed form).
+/// digamma(x + 1/2) - digamma(x): relative error below 1e-6.
+void batch_digamma_half_step(std::span<const float> x, std::span<float> out) noexcept;
+/// x with D(x) = s: relative error below 1e-6 for s <= D(1), below 1e-5 elsewhere.
 void batch_inverse_log_minus_digamma(std::span<const float> s, std::span<float> out) noexcept;
 /// lgamma(x + 1/2) - lgamma(x): error below 1e-6 max(1, |value|).
 void batch_log_gamma_half_step(std::span<const float> x, std::span<float> out) noexcept;

@@ -11,6 +11,7 @@ void batch_exp_of_negative(std::span<const float> x, std::span<float> out) noexc
 void batch_digamma(std::span<const float> x, std::span<float> out) noexcept;
 void batch_trigamma(std::span<const float> x, std::span<float> out) noexcept;
 void batch_log_minus_digamma(std::span<const float> x, std::span<float> out) noexcept;
+void batch_digamma_half_step(std::span<const float> x, std::span<float> out) noexcept;
 void batch_inverse_log_minus_digamma(std::span<const float> s, std::span<float> out) noexcept;
 void batch_log_gamma_half_step(std::span<const float> x, std::span<float> out) noexcept;
 void batch_log_gamma_difference(std::span<const float> x, std::span<const float> h, std::span<float> out) noexcept;

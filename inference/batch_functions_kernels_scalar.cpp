@@ -35,6 +35,10 @@ void batch_log_minus_digamma(std::span<const float> x, std::span<float> out) noe
   map(x, out, log_minus_digamma);
 }
 
+void batch_digamma_half_step(std::span<const float> x, std::span<float> out) noexcept {
+  map(x, out, [](double v) { return digamma_difference(v, 0.5); });
+}
+
 void batch_inverse_log_minus_digamma(std::span<const float> s, std::span<float> out) noexcept {
   map(s, out, inverse_log_minus_digamma);
 }

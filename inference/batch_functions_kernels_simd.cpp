@@ -9,6 +9,7 @@
 #include "inference/batch_functions.h"
 #include "inference/batch_functions_kernels.h"
 #include "inference/batch_math-inl.h"
+#include "inference/batch_projection-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace felt {
@@ -42,9 +43,20 @@ HWY_INLINE V log_gamma_half_step_of(V x) {
   return pair::Mul(constant(0.5f), pair::Add(log_of(x), log_of(pair::Div(x, pair::Add(x, w)))));
 }
 
+/// As the projection computes them: without logarithms from x = 1 on.
+HWY_INLINE ShapeTerms shape_terms_of(V x) {
+  const V inverse = pair::Div(constant(1.0f), x), zero = pair::Zero();
+  const V half = constant(0.5f);
+  return half_step_shape_terms(x, inverse, {half, pair::Mul(half, inverse), zero, zero, zero, zero, zero});
+}
+
 HWY_INLINE V digamma_of(V x) { return pair::Sub(log_of(x), log_minus_digamma_of(reciprocals(x))); }
 
-HWY_INLINE V inverse_of(V s) { return inverse_log_minus_digamma_of(s, constant(1.0f), constant(0.577215665f)); }
+HWY_INLINE V digamma_half_step_of(V x) {
+  return pair::Add(shape_terms_of(x).step_excess, pair::Div(constant(0.5f), x));
+}
+
+HWY_INLINE V inverse_of(V s) { return shape_of(s, constant(1.0f), constant(0.577215665f)); }
 
 HWY_INLINE V log_gamma_difference_of(V x, V h) {
   const V end = pair::Add(constant(1.0f), pair::Add(x, h));
@@ -67,10 +79,13 @@ void TrigammaArray(const float* x, const float* y, size_t n, float* out) {
   map(x, y, n, out, [](V v, V) HWY_ATTR { return trigamma_of(v); });
 }
 void LogMinusDigammaArray(const float* x, const float* y, size_t n, float* out) {
-  map(x, y, n, out, [](V v, V) HWY_ATTR { return log_minus_digamma_of(reciprocals(v)); });
+  map(x, y, n, out, [](V v, V) HWY_ATTR { return shape_terms_of(v).d; });
 }
 void InverseArray(const float* x, const float* y, size_t n, float* out) {
   map(x, y, n, out, [](V v, V) HWY_ATTR { return inverse_of(v); });
+}
+void DigammaHalfStepArray(const float* x, const float* y, size_t n, float* out) {
+  map(x, y, n, out, [](V v, V) HWY_ATTR { return digamma_half_step_of(v); });
 }
 void HalfStepArray(const float* x, const float* y, size_t n, float* out) {
   map(x, y, n, out, [](V v, V) HWY_ATTR { return log_gamma_half_step_of(v); });
@@ -92,6 +107,7 @@ HWY_EXPORT(DigammaArray);
 HWY_EXPORT(TrigammaArray);
 HWY_EXPORT(LogMinusDigammaArray);
 HWY_EXPORT(InverseArray);
+HWY_EXPORT(DigammaHalfStepArray);
 HWY_EXPORT(HalfStepArray);
 HWY_EXPORT(LogGammaDifferenceArray);
 
@@ -108,6 +124,7 @@ FELT_BATCH_FUNCTION(batch_digamma, DigammaArray)
 FELT_BATCH_FUNCTION(batch_trigamma, TrigammaArray)
 FELT_BATCH_FUNCTION(batch_log_minus_digamma, LogMinusDigammaArray)
 FELT_BATCH_FUNCTION(batch_inverse_log_minus_digamma, InverseArray)
+FELT_BATCH_FUNCTION(batch_digamma_half_step, DigammaHalfStepArray)
 FELT_BATCH_FUNCTION(batch_log_gamma_half_step, HalfStepArray)
 #undef FELT_BATCH_FUNCTION
 

@@ -48,9 +48,9 @@ struct MaterialCounts {
 /// cannot hold. Outputs do not depend on the number of threads, on the order of voxels or on which other voxels are in
 /// the batch.
 ///
-/// Error against f64, relative (p absolute, tau to the class's sqrt(gamma/beta)), with L the largest |log evidence|
-/// among the classes that matter: 1e-5 + 2e-6 L for p, tau, kappa, beta, gamma, and that times max(1, L) for the
-/// surprise. Never NaN; kappa and beta stay in [1e-15, 1e15], gamma in [1e-30, 1e30].
+/// Error against f64, relative (p absolute; tau to the larger of the class's sqrt(gamma/beta) and the way tau moved),
+/// with L the largest |log evidence| among the classes that matter: 1e-5 + 2e-6 L for p, tau, kappa, beta, gamma, and
+/// that times max(1, L) for the surprise. Never NaN; kappa and beta stay in [1e-15, 1e15], gamma in [1e-30, 1e30].
 MaterialCounts material_view(const MaterialBatch& batch, double rho) noexcept;
 
 /// The same for many batches (the blocks of a region), one task each.

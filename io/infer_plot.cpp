@@ -73,13 +73,13 @@ Plot panel(const Densities& d, const std::string& title, const std::vector<doubl
     std::transform(x.begin(), x.end(), s.y.begin(), density);
     plot.series.push_back(std::move(s));
   };
+  curve("all classes", -1, PlotSeries::Style::line, [&](double at) { return pdf(d.next, at); });
   for (size_t c = 0; c < d.next.component.size(); ++c) {
     char weight[32];
     std::snprintf(weight, sizeof weight, " %.3f", d.next.weight[c]);
     curve(d.names[c] + weight, int(c), PlotSeries::Style::line,
           [&](double at) { return d.next.weight[c] * pdf(d.next.component[c], at); });
   }
-  curve("all classes", -1, PlotSeries::Style::line, [&](double at) { return pdf(d.next, at); });
   if (exact) {
     curve("before projection", -1, PlotSeries::Style::dashed, [&](double at) { return pdf(exact->next, at); });
   } else {
@@ -123,8 +123,11 @@ std::vector<Plot> infer_plots(std::string_view line, const std::string& title) {
     low = std::min(low, reading);
     high = std::max(high, reading);
   }
-  return {panel(before, title + ": before", in.psi, low, high),
-          panel(after, title + outcome, in.psi, low, high, exact)};
+  const double margin = 0.06 * (high - low);  // a reading at the edge keeps its label
+  low -= margin;
+  high += margin;
+  const std::string& name = in.title.empty() ? title : in.title;
+  return {panel(before, name + ": before", in.psi, low, high), panel(after, name + outcome, in.psi, low, high, exact)};
 }
 
 }  // namespace felt

@@ -204,6 +204,8 @@ InferRequest parse_infer_request(std::string_view line) {
   if (const auto names = document.find("names"); names != document.end() && names->is_array()) {
     for (const json& name : *names) request.names.push_back(name.is_string() ? name.get<std::string>() : shown(name));
   }
+  if (const auto title = document.find("title"); title != document.end() && title->is_string())
+    request.title = title->get<std::string>();
   if (request.model == InferRequest::Model::predict) {
     const auto list = [&](const char* name, auto check) {
       return document.contains(name) ? numbers(document[name], name, check) : std::vector<double>{};

@@ -19,6 +19,7 @@ struct InferRequest {
   std::vector<double> noise_sd;  ///< as long as psi
   double rho = 0;
   Projection projection = Projection::kl;
+  std::string title;                           ///< for plots; may be empty
   std::vector<std::string> names;              ///< of the classes, for plots; may be shorter than the prior
   std::vector<double> quantiles, below, cvar;  ///< of `predict`
 };

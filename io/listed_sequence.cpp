@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "io/camera_file.h"
 #include "io/image_decode.h"
+#include "io/lidar_scan.h"
 #include "io/probability_images.h"
 #include "io/recorded_pose.h"
 #include "io/registration.h"
@@ -82,11 +83,16 @@ private:
   ProbabilityImage read_class_maps(const FrameRecord& frame) const;
   PinholeCamera camera_of_color_grid(int width, int height) const;
   bool on_depth_grid(int width, int height) const;
+  /// Colour without a camera of its own comes through the depth camera's lens.
+  const Distortion& color_distortion() const {
+    return listing_.color_intrinsics ? listing_.color_distortion : listing_.distortion;
+  }
 
   SequenceListing listing_;
   SequenceInfo info_;
   bool with_color_, with_instances_, bgr_;
   int label_offset_;
+  Image<int32_t> undistortion_;    ///< of the depth grid; empty where the lens does not distort
   Image<float> z_per_ray_length_;  ///< empty where depth lies along the optical axis
 };
 
@@ -98,6 +104,7 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   info_.pose_convention = to_string(listing_.pose_convention);
   info_.classes = listing_.classes;
   info_.notes = listing_.notes;
+  info_.voxel_size_m = listing_.voxel_size_m, info_.max_depth_m = listing_.max_depth_m;
   info_.properties_file = listing_.properties_file;
   info_.touches_file = listing_.touches_file;
   info_.recorded_frames = int64_t(listing_.frames.size());
@@ -121,6 +128,7 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   with_instances_ = options.read_instances;
   info_.has_instances = any([](const FrameRecord& f) { return !f.instances.empty() || !f.masks.empty(); });
 
+  if (!listing_.distortion.none()) undistortion_ = undistortion_map(info_.camera, listing_.distortion);
   if (listing_.depth_is_ray_length) {
     z_per_ray_length_ = Image<float>(info_.camera.width, info_.camera.height);
     for (int v = 0; v < info_.camera.height; ++v)
@@ -192,6 +200,14 @@ Eigen::Isometry3d ListedSequence::read_pose(const FrameRecord& frame) const {
 }
 
 DepthImage ListedSequence::read_depth(const ImageSource& source) const {
+  if (source.codec == ImageSource::Codec::scan) {
+    DepthImage depth_m = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
+      return depth_of_scan(decode_scan(bytes, where), source.face);
+    });
+    if (std::none_of(depth_m.begin(), depth_m.end(), [](float depth) { return depth > 0; }))
+      throw Skip{"depth all zero", source.path.string()};
+    return depth_m;
+  }
   const Image<uint16_t> raw = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
     if (source.codec == ImageSource::Codec::image_file) return decode_gray16(bytes, where);
     return decode_u16_values(bytes, source.codec == ImageSource::Codec::zlib_u16, info_.camera.width,
@@ -212,6 +228,7 @@ DepthImage ListedSequence::read_depth(const ImageSource& source) const {
     depth_m.data()[p] = valid ? float(value) / scale : 0.0f;
   }
   if (!any) throw Skip{"depth all zero", source.path.string()};
+  if (!undistortion_.empty()) depth_m = undistorted(depth_m, undistortion_, 0.0f);
   for (size_t p = 0; p < z_per_ray_length_.size(); ++p) depth_m.data()[p] *= z_per_ray_length_.data()[p];
   return depth_m;
 }
@@ -231,15 +248,22 @@ ColorImage ListedSequence::read_color(const ImageSource& source, const DepthImag
   ColorImage image = decoded(source, "colour", decode_color);
   if (bgr_)
     for (Rgba8& pixel : image) std::swap(pixel.r, pixel.b);
-  if (on_depth_grid(image.width(), image.height())) return image;
+  const Rgba8 outside{0, 0, 0, 0};
+  if (on_depth_grid(image.width(), image.height())) {
+    if (!undistortion_.empty()) image = undistorted(image, undistortion_, outside);
+    return image;
+  }
   return registered_to_depth(image, camera_of_color_grid(image.width(), image.height()), depth_m, info_.camera,
-                             listing_.T_color_depth, Rgba8{0, 0, 0, 0});
+                             listing_.T_color_depth, outside, color_distortion());
 }
 
 Image<uint16_t> ListedSequence::read_ids(const ImageSource& source, const std::string& kind,
                                          const DepthImage& depth_m) const {
   Image<uint16_t> image = decoded(source, kind, decode_gray16);
-  if (image.width() == info_.camera.width && image.height() == info_.camera.height) return image;
+  if (image.width() == info_.camera.width && image.height() == info_.camera.height) {
+    if (!undistortion_.empty()) image = undistorted(image, undistortion_, kNoLabel);
+    return image;
+  }
   // Networks label the colour image: another size is right where it has the colour image's shape.
   const double shape = double(image.width()) * info_.camera.height / (double(image.height()) * info_.camera.width);
   if (!listing_.color_intrinsics && std::abs(shape - 1) > 0.02)
@@ -247,7 +271,7 @@ Image<uint16_t> ListedSequence::read_ids(const ImageSource& source, const std::s
                describe_mismatch(source.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
                                  size_text(image.width(), image.height()))};
   return registered_to_depth<uint16_t>(image, camera_of_color_grid(image.width(), image.height()), depth_m,
-                                       info_.camera, listing_.T_color_depth, kNoLabel);
+                                       info_.camera, listing_.T_color_depth, kNoLabel, color_distortion());
 }
 
 LabelImage ListedSequence::read_labels(const ImageSource& source, const DepthImage& depth_m) const {

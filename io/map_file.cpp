@@ -158,9 +158,10 @@ Map read_map(const fs::path& path, uint64_t bytes) {
 
 void save_map(const Map& map, const fs::path& path, const SaveOptions& options) {
   openvdb::initialize();
+  VdbFile file(path);
   const std::vector<MapGrid> grids = options.views ? map_grids(map) : state_grids(map);
   const std::string hash = map_hash(map);
-  VdbFile file(path, to_metadata(map, hash), grids.size(), hash);
+  file.begin(to_metadata(map, hash), grids.size(), hash);
   for (const MapGrid& grid : grids) file.write(*grid.make(), options.compression, grid.noisy);
   file.flush();
   file.commit(make_map_trailer(file.written(), kMapFileVersion));

@@ -109,7 +109,8 @@ std::vector<std::string> export_vdb(const Map& map, const std::filesystem::path&
   openvdb::MetaMap metadata;
   metadata.insertMeta("creator", openvdb::StringMetadata("feltmap export"));
   metadata.insertMeta("map_hash", openvdb::StringMetadata(map_hash(map)));
-  VdbFile file(path, metadata, grids.size(), map_hash(map));
+  VdbFile file(path);
+  file.begin(metadata, grids.size(), map_hash(map));
   std::vector<std::string> names;
   for (const MapGrid& grid : grids) {
     openvdb::GridBase::Ptr made = grid.make();

@@ -3,43 +3,55 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
+#include <iterator>
 #include <string>
 
 #include "core/pose.h"
 #include "io/camera_file.h"
+#include "io/image_decode.h"
 
 namespace felt {
+namespace {
+
+/// 255 where any channel of the image is not zero.
+Image<uint8_t> set_pixels(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  const std::vector<uint8_t> bytes((std::istreambuf_iterator<char>(stream)), {});
+  const ImageHeader header = read_image_header(bytes, file.string());
+  Image<uint8_t> set(header.width, header.height);
+  if (header.format == ImageFormat::png && header.channels == 1) {
+    const Image<uint16_t> values = decode_gray16(bytes, file.string());
+    std::transform(values.begin(), values.end(), set.begin(), [](uint16_t v) { return v != 0 ? 255 : 0; });
+  } else {
+    const ColorImage colors = decode_color(bytes, file.string());
+    std::transform(colors.begin(), colors.end(), set.begin(), [](Rgba8 c) { return c.r | c.g | c.b ? 255 : 0; });
+  }
+  return set;
+}
+
+}  // namespace
 
 ViewMask read_view_mask(const std::filesystem::path& file, const std::vector<double>& intrinsics,
                         const std::vector<double>& pose) {
   if (!std::filesystem::is_regular_file(file))
     throw IoError(describe_mismatch(file.string(), "mask", "a readable image", "none"));
-  cv::Mat image;
-  try {
-    image = cv::imread(file.string(), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
-  } catch (const cv::Exception&) {
-    image.release();
-  }
-  if (image.empty()) throw FormatError(describe_mismatch(file.string(), "mask", "an image", "something else"));
+  const Image<uint8_t> image = set_pixels(file);
   const auto size_text = [](double w, double h) {
     char text[64];
     std::snprintf(text, sizeof text, "%.0f x %.0f", w, h);
     return std::string(text);
   };
-  if (intrinsics.size() == 6 && (intrinsics[4] != image.cols || intrinsics[5] != image.rows))
+  if (intrinsics.size() == 6 && (intrinsics[4] != image.width() || intrinsics[5] != image.height()))
     throw FormatError(describe_mismatch(file.string(), "size of the mask",
                                         size_text(intrinsics[4], intrinsics[5]) + " as its camera",
-                                        size_text(image.cols, image.rows)));
+                                        size_text(image.width(), image.height())));
   ViewMask view;
-  view.camera = {intrinsics.at(0), intrinsics.at(1), intrinsics.at(2), intrinsics.at(3), image.cols, image.rows};
+  view.camera = {intrinsics.at(0), intrinsics.at(1), intrinsics.at(2), intrinsics.at(3), image.width(), image.height()};
   check_camera_fits_image(view.camera, file.string());
   const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> recorded(pose.data());
   if (pose.size() != 16 || rigid_pose(recorded, view.T_world_camera) != PoseFault::none)
     throw ConfigError(describe_mismatch("--pose", "matrix", "a rigid transform", "another"));
-  view.mask = Image<uint8_t>(image.cols, image.rows);
-  cv::Mat set = image != 0;
-  for (int v = 0; v < image.rows; ++v) std::copy_n(set.ptr<uint8_t>(v), image.cols, view.mask.row(v));
+  view.mask = image;
   return view;
 }
 

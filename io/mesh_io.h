@@ -38,4 +38,10 @@ void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh);
 /// already. Axes are the map's, which glTF viewers take for y up.
 void write_glb(const std::filesystem::path& path, const TriangleMesh& mesh);
 
+/// One page that shows the mesh in any browser with WebGL 2, without a network: turn, move, come nearer, shading by
+/// colour, shape or normals. Positions are kept to 1/65535 of the mesh's box. `up` is the axis that points up at first:
+/// +x, -x, +y, -y, +z or -z.
+void write_html(const std::filesystem::path& path, const TriangleMesh& mesh, const std::string& title,
+                const std::string& up = "+z");
+
 }  // namespace felt

@@ -114,6 +114,8 @@ void apply_options(const SequenceOptions& options, SequenceListing& listing) {
   if (options.depth_scale) listing.depth_scale = *options.depth_scale;
   if (options.depth_encoding) listing.depth_encoding = *options.depth_encoding;
   if (options.depth_is_ray_length) listing.depth_is_ray_length = *options.depth_is_ray_length;
+  if (options.distortion) listing.distortion = *options.distortion;
+  if (options.T_body_camera) listing.T_body_camera = *options.T_body_camera;
   if (options.pose_convention) listing.pose_convention = *options.pose_convention;
   if (options.pose_stamp_offset != 0 && listing.layout != kTumLayout.name)
     shift_poses(options.pose_stamp_offset, listing);
@@ -144,7 +146,7 @@ auto with_io_errors(Step step) {
 
 std::span<const Layout> all_layouts() {
   static const Layout layouts[] = {kGenericLayout, kTumLayout,     kReplicaLayout, kApcLayout, kSevenScenesLayout,
-                                   kSensLayout,    kScanNetLayout, kRedwoodLayout, kIclLayout};
+                                   kSensLayout,    kScanNetLayout, kRedwoodLayout, kIclLayout, kLidarLayout};
   return layouts;
 }
 

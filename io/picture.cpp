@@ -2,23 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "core/error.h"
 #include "io/atomic_file.h"
+#include "io/image_encode.h"
 #include "mapping/mesh_raster.h"
 
 namespace felt {
 namespace fs = std::filesystem;
 namespace {
 
-void write_encoded(const fs::path& path, const cv::Mat& pixels) {
-  std::vector<uchar> bytes;
-  if (!cv::imencode(".png", pixels, bytes)) throw IoError(path.string() + ": cannot encode as PNG");
+void write_encoded(const fs::path& path, const std::vector<uint8_t>& png) {
   AtomicFile file(path);
-  file.write(bytes.data(), bytes.size());
+  file.write(png.data(), png.size());
   file.commit();
 }
 
@@ -28,35 +25,26 @@ void paste(const ColorImage& panel, ColorImage& picture, int u0, int v0) {
 
 }  // namespace
 
-void write_png(const fs::path& path, const ColorImage& image) {
-  const cv::Mat rgba(image.height(), image.width(), CV_8UC4, const_cast<Rgba8*>(image.data()));
-  cv::Mat bgr;
-  cv::cvtColor(rgba, bgr, cv::COLOR_RGBA2BGR);
-  write_encoded(path, bgr);
-}
+void write_png(const fs::path& path, const ColorImage& image) { write_encoded(path, encode_png(image)); }
 
 void write_depth_png(const fs::path& path, const DepthImage& depth_m, double metres_per_step) {
-  cv::Mat steps(depth_m.height(), depth_m.width(), CV_16UC1);
-  for (int v = 0; v < depth_m.height(); ++v)
-    for (int u = 0; u < depth_m.width(); ++u) {
-      const double s = std::round(depth_m(u, v) / metres_per_step);
-      steps.at<uint16_t>(v, u) = s >= 1 && s <= 65535 ? uint16_t(s) : uint16_t(0);
-    }
-  write_encoded(path, steps);
+  Image<uint16_t> steps(depth_m.width(), depth_m.height());
+  for (size_t i = 0; i < steps.size(); ++i) {
+    const double s = std::round(depth_m.data()[i] / metres_per_step);
+    steps.data()[i] = s >= 1 && s <= 65535 ? uint16_t(s) : uint16_t(0);
+  }
+  write_encoded(path, encode_png(steps));
 }
 
-void write_label_png(const fs::path& path, const LabelImage& labels) {
-  write_encoded(path, cv::Mat(labels.height(), labels.width(), CV_16UC1, const_cast<uint16_t*>(labels.data())));
-}
+void write_label_png(const fs::path& path, const LabelImage& labels) { write_encoded(path, encode_png(labels)); }
 
 void write_level_png(const fs::path& path, const Image<float>& values, double low, double high) {
-  cv::Mat levels(values.height(), values.width(), CV_16UC1);
-  for (int v = 0; v < values.height(); ++v)
-    for (int u = 0; u < values.width(); ++u) {
-      const double share = std::clamp((double(values(u, v)) - low) / (high - low), 0.0, 1.0);
-      levels.at<uint16_t>(v, u) = std::isfinite(values(u, v)) ? uint16_t(std::lround(1 + 65534 * share)) : uint16_t(0);
-    }
-  write_encoded(path, levels);
+  Image<uint16_t> levels(values.width(), values.height());
+  for (size_t i = 0; i < levels.size(); ++i) {
+    const double value = double(values.data()[i]), share = std::clamp((value - low) / (high - low), 0.0, 1.0);
+    levels.data()[i] = std::isfinite(value) ? uint16_t(std::lround(1 + 65534 * share)) : uint16_t(0);
+  }
+  write_encoded(path, encode_png(levels));
 }
 
 ColorImage colored(const Image<float>& values, double low, double high) {

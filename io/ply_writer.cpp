@@ -1,3 +1,6 @@
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <bit>
 #include <cstring>
 
@@ -8,27 +11,29 @@ namespace felt {
 namespace {
 static_assert(std::endian::native == std::endian::little, "records are written as they lie in memory");
 
-/// Collects records and hands them to the file in pieces of about a megabyte.
-class RecordWriter {
-public:
-  explicit RecordWriter(AtomicFile& file) : file_(file) { buffer_.reserve(kPiece + 4096); }
-  template <typename T>
-  void put(const T& value) {
-    buffer_.append(reinterpret_cast<const char*>(&value), sizeof value);
+/// Makes `count` records of `record_bytes` each, in parallel, and hands them to the file in pieces of some megabytes.
+/// `fill(i, to)` writes record i.
+template <typename Fill>
+void write_records(AtomicFile& file, size_t count, size_t record_bytes, Fill fill) {
+  constexpr size_t kPieceBytes = 4 << 20;
+  const size_t at_once = std::max<size_t>(1, kPieceBytes / record_bytes);
+  std::vector<char> piece(std::min(count, at_once) * record_bytes);
+  for (size_t first = 0; first < count; first += at_once) {
+    const size_t end = std::min(count, first + at_once);
+    constexpr size_t kTask = 16384;
+    tbb::parallel_for(tbb::blocked_range<size_t>(first, end, kTask), [&](const tbb::blocked_range<size_t>& range) {
+      for (size_t i = range.begin(); i < range.end(); ++i) fill(i, piece.data() + (i - first) * record_bytes);
+    });
+    file.write(piece.data(), (end - first) * record_bytes);
   }
-  void end_record() {
-    if (buffer_.size() >= kPiece) flush();
-  }
-  void flush() {
-    file_.write(buffer_);
-    buffer_.clear();
-  }
+}
 
-private:
-  static constexpr size_t kPiece = 1 << 20;
-  AtomicFile& file_;
-  std::string buffer_;
-};
+/// Appends the bytes of a value to a record.
+template <typename T>
+void put(char*& to, const T& value) {
+  std::memcpy(to, &value, sizeof value);
+  to += sizeof value;
+}
 
 std::string header(const TriangleMesh& mesh, const std::vector<std::string>& comments) {
   std::string text = "ply\nformat binary_little_endian 1.0\n";
@@ -51,26 +56,24 @@ std::string header(const TriangleMesh& mesh, const std::vector<std::string>& com
 void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh, const std::vector<std::string>& comments) {
   AtomicFile file(path);
   file.write(header(mesh, comments));
-  RecordWriter out(file);
-  for (size_t i = 0; i < mesh.positions.size(); ++i) {
-    out.put(mesh.positions[i]);
-    if (!mesh.normals.empty()) out.put(mesh.normals[i]);
+  const size_t vertex_bytes = 12 + (mesh.normals.empty() ? 0 : 12) + (mesh.colors.empty() ? 0 : 3) +
+                              (mesh.labels.empty() ? 0 : 2) + 4 * mesh.scalars.size();
+  write_records(file, mesh.positions.size(), vertex_bytes, [&](size_t i, char* to) {
+    put(to, mesh.positions[i]);
+    if (!mesh.normals.empty()) put(to, mesh.normals[i]);
     if (!mesh.colors.empty()) {
-      out.put(mesh.colors[i].r);
-      out.put(mesh.colors[i].g);
-      out.put(mesh.colors[i].b);
+      put(to, mesh.colors[i].r);
+      put(to, mesh.colors[i].g);
+      put(to, mesh.colors[i].b);
     }
-    if (!mesh.labels.empty()) out.put(mesh.labels[i]);
-    for (const MeshScalars& s : mesh.scalars) out.put(s.values[i]);
-    out.end_record();
-  }
-  for (size_t i = 0; i < mesh.triangles.size(); ++i) {
-    out.put(uint8_t(3));
-    out.put(mesh.triangles[i]);
-    for (const MeshScalars& s : mesh.triangle_scalars) out.put(s.values[i]);
-    out.end_record();
-  }
-  out.flush();
+    if (!mesh.labels.empty()) put(to, mesh.labels[i]);
+    for (const MeshScalars& s : mesh.scalars) put(to, s.values[i]);
+  });
+  write_records(file, mesh.triangles.size(), 13 + 4 * mesh.triangle_scalars.size(), [&](size_t i, char* to) {
+    put(to, uint8_t(3));
+    put(to, mesh.triangles[i]);
+    for (const MeshScalars& s : mesh.triangle_scalars) put(to, s.values[i]);
+  });
   file.commit();
 }
 

@@ -38,8 +38,9 @@ struct SequenceInfo {
   ClassTable classes;                                   ///< empty where the sequence brings none
   std::filesystem::path properties_file, touches_file;  ///< that the sequence carries; empty where it has none
   int64_t recorded_frames = 0;                          ///< before the selection of frames
-  std::string fingerprint;         ///< of the recording, wherever it lies and whatever of it is selected
-  std::vector<std::string> notes;  ///< what was assumed or repaired, one sentence each
+  std::string fingerprint;                   ///< of the recording, wherever it lies and whatever of it is selected
+  double voxel_size_m = 0, max_depth_m = 0;  ///< what suits the sensor; 0: nothing else than usual
+  std::vector<std::string> notes;            ///< what was assumed or repaired, one sentence each
 };
 
 /// A recorded sequence. Opening reads what is small (poses, file names, stamps, camera); `read` decodes one frame and

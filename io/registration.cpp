@@ -16,11 +16,12 @@ int nearest_pixel(double coordinate, int size) {
 
 template <typename Pixel>
 Image<Pixel> registered_to_depth(const Image<Pixel>& image, const PinholeCamera& camera, const DepthImage& depth_m,
-                                 const PinholeCamera& depth_camera, const Eigen::Matrix4d& T_image_depth,
-                                 Pixel outside) {
+                                 const PinholeCamera& depth_camera, const Eigen::Matrix4d& T_image_depth, Pixel outside,
+                                 const Distortion& distortion) {
   const int width = depth_camera.width, height = depth_camera.height;
   Image<Pixel> registered(width, height, outside);
-  if (T_image_depth.isIdentity(0)) {
+  const bool same_place = T_image_depth.isIdentity(0);
+  if (same_place && distortion.none()) {
     std::vector<int> column(width);
     for (int u = 0; u < width; ++u)
       column[u] = nearest_pixel(camera.project(depth_camera.ray(u, 0)).x(), image.width());
@@ -36,11 +37,11 @@ Image<Pixel> registered_to_depth(const Image<Pixel>& image, const PinholeCamera&
   const Eigen::Vector3d t = T_image_depth.topRightCorner<3, 1>();
   for (int v = 0; v < height; ++v)
     for (int u = 0; u < width; ++u) {
-      const double z = depth_m(u, v);
+      const double z = same_place ? 1.0 : double(depth_m(u, v));
       if (z <= 0) continue;
       const Eigen::Vector3d p = R * (z * depth_camera.ray(u, v)) + t;
       if (p.z() <= 0) continue;
-      const Eigen::Vector2d pixel = camera.project(p);
+      const Eigen::Vector2d pixel = project_distorted(camera, distortion, p.x() / p.z(), p.y() / p.z());
       const int x = nearest_pixel(pixel.x(), image.width()), y = nearest_pixel(pixel.y(), image.height());
       if (x >= 0 && y >= 0) registered(u, v) = image(x, y);
     }
@@ -48,8 +49,8 @@ Image<Pixel> registered_to_depth(const Image<Pixel>& image, const PinholeCamera&
 }
 
 template Image<Rgba8> registered_to_depth(const Image<Rgba8>&, const PinholeCamera&, const DepthImage&,
-                                          const PinholeCamera&, const Eigen::Matrix4d&, Rgba8);
+                                          const PinholeCamera&, const Eigen::Matrix4d&, Rgba8, const Distortion&);
 template Image<uint16_t> registered_to_depth(const Image<uint16_t>&, const PinholeCamera&, const DepthImage&,
-                                             const PinholeCamera&, const Eigen::Matrix4d&, uint16_t);
+                                             const PinholeCamera&, const Eigen::Matrix4d&, uint16_t, const Distortion&);
 
 }  // namespace felt

@@ -14,11 +14,12 @@ namespace felt {
 
 /// Where one image lies: a whole file, or `bytes` at `offset` of a container.
 struct ImageSource {
-  enum class Codec { image_file, zlib_u16, raw_u16 };
+  enum class Codec { image_file, zlib_u16, raw_u16, scan };
   std::filesystem::path path;
   uint64_t offset = 0;
   uint64_t bytes = 0;  ///< 0: the whole file
   Codec codec = Codec::image_file;
+  int face = 0;  ///< of a scan (io/lidar_scan.h)
   bool empty() const { return path.empty(); }
 };
 
@@ -49,6 +50,7 @@ struct SequenceListing {
   std::optional<Intrinsics> intrinsics;        ///< of the depth images
   int width = 0, height = 0;                   ///< of the depth images; 0: from the first one that can be read
   std::optional<Intrinsics> color_intrinsics;  ///< where colour is not on the depth images' grid
+  Distortion distortion, color_distortion;     ///< of each camera's lens
   Eigen::Matrix4d T_color_depth = Eigen::Matrix4d::Identity();
   double depth_scale = 1000;
   DepthEncoding depth_encoding = DepthEncoding::plain;
@@ -58,6 +60,7 @@ struct SequenceListing {
   ClassTable classes;
   bool stamped = false;  ///< frames carry times in seconds; otherwise `stamp_s` is the frame number
   std::filesystem::path properties_file, touches_file;  ///< empty: the sequence carries none
+  double voxel_size_m = 0, max_depth_m = 0;  ///< what suits the sensor, where the user says nothing; 0: the defaults
   std::vector<std::string> notes;
 };
 

@@ -6,6 +6,7 @@
 
 #include "core/camera.h"
 #include "core/frame_selection.h"
+#include "io/undistortion.h"
 
 namespace felt {
 
@@ -51,7 +52,9 @@ struct SequenceOptions {
   std::optional<DepthEncoding> depth_encoding{};
   std::optional<bool> depth_is_ray_length{};  ///< depth along the pixel's ray instead of along the optical axis
   std::optional<PoseConvention> pose_convention{};
-  double max_dt_s = 0.02;        ///< largest difference of stamps within one frame
+  std::optional<Distortion> distortion{};            ///< of the depth image's lens, and of colour on its grid
+  std::optional<Eigen::Isometry3d> T_body_camera{};  ///< where recorded poses are those of a body
+  double max_dt_s = 0.02;                            ///< largest difference of stamps within one frame
   double pose_stamp_offset = 0;  ///< added to the stamps of poses: seconds, or frame numbers where there are no times
   int label_offset = 0;          ///< added to every label id; ids that leave 16 bits become kNoLabel
   bool bgr = false;              ///< colour images hold red and blue exchanged

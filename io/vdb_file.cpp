@@ -27,13 +27,13 @@ std::ofstream opened(const std::filesystem::path& path, std::vector<char>& buffe
 
 }  // namespace
 
-VdbFile::VdbFile(const std::filesystem::path& path, const openvdb::MetaMap& metadata, size_t grids,
-                 const std::string& seed)
-    : shown_(path),
-      file_(path),
-      buffer_(kBufferBytes),
-      stream_(opened(file_.path(), buffer_)),
-      writer_(stream_, metadata, int32_t(grids), seed) {
+VdbFile::VdbFile(const std::filesystem::path& path)
+    : shown_(path), file_(path), buffer_(kBufferBytes), stream_(opened(file_.path(), buffer_)) {
+  check();
+}
+
+void VdbFile::begin(const openvdb::MetaMap& metadata, size_t grids, const std::string& seed) {
+  writer_.emplace(stream_, metadata, int32_t(grids), seed);
   check();
 }
 
@@ -42,7 +42,7 @@ void VdbFile::check() {
 }
 
 void VdbFile::write(openvdb::GridBase& grid, MapCompression compression, bool noisy) {
-  writer_.write(grid, flags_of(compression, noisy));
+  writer_->write(grid, flags_of(compression, noisy));
   // A full disk shows here, not after the remaining grids.
   check();
 }

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,10 @@ namespace felt {
 /// An OpenVDB file that appears whole or not at all, written grid by grid. Every member throws IoError.
 class VdbFile {
 public:
+  /// Nothing can be written yet, but a place that cannot be written to shows here.
+  explicit VdbFile(const std::filesystem::path& path);
   /// `grids`: the number of `write` calls that follow. Same grids and `seed`, same bytes.
-  VdbFile(const std::filesystem::path& path, const openvdb::MetaMap& metadata, size_t grids, const std::string& seed);
+  void begin(const openvdb::MetaMap& metadata, size_t grids, const std::string& seed);
   /// `noisy`: what `MapCompression::fast` leaves as it is.
   void write(openvdb::GridBase& grid, MapCompression compression, bool noisy);
   /// Ends the OpenVDB part, so that `written` holds all of it.
@@ -33,7 +36,7 @@ private:
   AtomicFile file_;
   std::vector<char> buffer_;
   std::ofstream stream_;
-  VdbWriter writer_;
+  std::optional<VdbWriter> writer_;
 };
 
 }  // namespace felt

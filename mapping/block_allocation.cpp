@@ -3,7 +3,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <span>
@@ -65,48 +64,19 @@ std::vector<BlockCoord> marked_blocks(const std::vector<uint8_t>& marks, const V
   return blocks;
 }
 
-/// Distance in pixels between the pixels of a tile that are looked at: a quarter of a block on the tile's farthest
-/// surface, half of that where the tile sees more than one surface.
-int stride_in_tile(const DepthRange& tile, float quarter_block_px, float truncation_m) {
-  const float farthest_m = -tile.minus_farthest_m;
-  float apart_px = quarter_block_px / farthest_m;
-  if (farthest_m - tile.nearest_m > truncation_m) apart_px *= 0.5f;
-  int stride = DepthTiles::kFinestTile;
-  while (stride > 1 && float(stride) > apart_px) stride /= 2;
-  return stride;
-}
-
-/// Marks the cells that a row of the finest tiles sees.
-void mark_tile_row(const DepthImage& depth_m, float min_depth_m, float max_depth_m, const DepthRange* tiles,
-                   int columns, int tile_row, float quarter_block_px, float truncation_m, const AllocationView& view,
-                   uint8_t* cells) {
-  constexpr int kTile = DepthTiles::kFinestTile;
-  std::array<uint8_t, RowSamples::kMost / kTile> strides;
+/// Marks the cells that image row `v` sees, with every stride-th pixel.
+void mark_row(const DepthImage& depth_m, int v, int stride, float min_depth_m, float max_depth_m,
+              const AllocationView& view, uint8_t* cells) {
+  const float* row = depth_m.row(v);
   RowSamples samples;
-  for (int first = 0; first < columns; first += int(strides.size())) {
-    const int count = std::min(columns - first, int(strides.size()));
-    for (int c = 0; c < count; ++c) {
-      const DepthRange& tile = tiles[first + c];
-      const bool empty = tile.nearest_m > max_depth_m;
-      strides[size_t(c)] = empty ? 0 : uint8_t(stride_in_tile(tile, quarter_block_px, truncation_m));
+  for (int u = 0; u < depth_m.width();) {
+    samples.count = 0;
+    for (; u < depth_m.width() && samples.count < RowSamples::kMost; u += stride) {
+      samples.u[samples.count] = float(u);
+      samples.depth_m[samples.count] = row[u];
+      samples.count += row[u] >= min_depth_m && row[u] <= max_depth_m;
     }
-    for (int y = 0; y < kTile; ++y) {
-      const int v = tile_row * kTile + y;
-      if (v >= depth_m.height()) break;
-      const float* row = depth_m.row(v);
-      samples.count = 0;
-      for (int c = 0; c < count; ++c) {
-        const int stride = strides[size_t(c)];
-        if (stride == 0 || y % stride != stride / 2) continue;
-        const int begin = (first + c) * kTile, end = std::min(depth_m.width(), begin + kTile);
-        for (int u = begin + stride / 2; u < end; u += stride) {
-          samples.u[samples.count] = float(u);
-          samples.depth_m[samples.count] = row[u];
-          samples.count += row[u] >= min_depth_m && row[u] <= max_depth_m;
-        }
-      }
-      mark_cells(view, v, samples, cells);
-    }
+    mark_cells(view, v, samples, cells);
   }
 }
 
@@ -163,13 +133,16 @@ std::vector<BlockCoord> blocks_in_view(const DepthImage& depth_m, const PinholeC
     view.origin[c] = float((T_world_camera.translation()[c] / voxel_size_m + 0.5) / kBlockDim - box.lowest[c]);
     view.cells[c] = int(box.cells[c]);
   }
-  const auto quarter_block_px = float(0.25 * block_m * std::max(camera.fx, camera.fy));  // at one metre
+  constexpr int kCoarsestStride = 4;
+  const double quarter_block_px = 0.25 * block_m * std::max(camera.fx, camera.fy) / farthest_m;
+  const int stride = int(std::clamp(quarter_block_px, 1.0, double(kCoarsestStride)));
   // Depth is marked while the survey has it at hand.
   tbb::parallel_for(all_tile_rows, [&](const tbb::blocked_range<int>& range) {
     for (int tile_row = range.begin(); tile_row < range.end(); ++tile_row) {
       if (!fitted) survey(tile_row);
-      mark_tile_row(depth_m, min_depth_m, max_depth_m, finest.row(tile_row), finest.columns, tile_row, quarter_block_px,
-                    float(truncation_m), view, scratch.cells.data());
+      const int first = tile_row * DepthTiles::kFinestTile, end = std::min(height, first + DepthTiles::kFinestTile);
+      for (int v = (first + stride - 1) / stride * stride; v < end; v += stride)
+        mark_row(depth_m, v, stride, min_depth_m, max_depth_m, view, scratch.cells.data());
     }
   });
   spread_ranges(tiles);

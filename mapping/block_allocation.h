@@ -17,7 +17,7 @@ struct AllocationScratch {
 };
 
 /// Coordinates, ascending, of the blocks that hold a voxel within the truncation of a measured surface. Rays of every
-/// n-th pixel are sampled at most half a block apart along and a quarter of a block across the ray (1 <= n <= 8), into
+/// n-th pixel are sampled at most half a block apart along and a quarter of a block across the ray (1 <= n <= 4), into
 /// a box of one byte a block around the view: time and memory do not depend on the size of the map. The same pass over
 /// the image fills `scratch.tiles`.
 std::vector<BlockCoord> blocks_in_view(const DepthImage& depth_m, const PinholeCamera& camera,

@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -55,6 +56,8 @@ std::string map_hash(const Map& map) {
       XXH3_128bits_update(&state, block.instance, sizeof *block.instance);
     }
     for (const TouchPlanes& t : block.touch) {
+      // Planes without a reading (their touches were undone) are as good as none.
+      if (std::none_of(t.n->value, t.n->value + kBlockVoxels, [](float count) { return count > 0; })) continue;
       XXH3_128bits_update(&state, &t.property, sizeof t.property);
       for (const Plane* plane : {t.n, t.mean, t.m2}) XXH3_128bits_update(&state, plane, sizeof *plane);
     }

@@ -26,7 +26,7 @@ void tile_range_row(const float* depth_m, int width, int height, int tile_row, f
   const FloatVec low = hn::Set(kF, min_depth_m), high = hn::Set(kF, max_depth_m);
   const FloatVec infinity = hn::Inf(kF);
   const int first = tile_row * kTile;
-  const bool whole = first + kTile <= height;
+  const bool whole = first + kTile <= height, more = first + 2 * kTile <= height;
   alignas(64) float nearest_m[kAtOnce], minus_farthest_m[kAtOnce];  // of the eight rows, column by column
   int u0 = 0;
   for (; whole && u0 + kAtOnce <= width; u0 += kAtOnce) {
@@ -35,7 +35,9 @@ void tile_range_row(const float* depth_m, int width, int height, int tile_row, f
 // Unrolled: eight loads, each with a stride of its own, are what a processor foresees.
 #pragma GCC unroll 8
       for (int v = 0; v < kTile; ++v) {
-        const FloatVec d = hn::LoadU(kF, depth_m + size_t(first + v) * width + u0 + u);
+        const float* from = depth_m + size_t(first + v) * width + u0 + u;
+        if (more) __builtin_prefetch(from + kTile * width);  // the next row of tiles
+        const FloatVec d = hn::LoadU(kF, from);
         const FloatMask usable = hn::And(hn::Ge(d, low), hn::Le(d, high));
         nearest = hn::Min(nearest, hn::IfThenElse(usable, d, infinity));
         minus_farthest = hn::Min(minus_farthest, hn::IfThenElse(usable, hn::Neg(d), infinity));

@@ -53,15 +53,15 @@ void update_block(Map& map, Block& block) {
   for (const Touch& touch : map.touches.touches)
     if (!touch.undone && touch.region.find(block.coord) != nullptr)
       touched[size_t(*map.properties.index_of(touch.request.property))] = true;
-  std::erase_if(block.touch, [&](const TouchPlanes& planes) { return !touched[planes.property]; });
+  // Planes whose last touch is undone stay, with zeros: a redo finds them, and undoing again and again takes no memory.
+  for (const TouchPlanes& planes : block.touch)
+    for (Plane* plane : {planes.n, planes.mean, planes.m2}) std::memset(plane, 0, sizeof(Plane));
   for (size_t p = 0; p < touched.size(); ++p) {
     if (!touched[p]) continue;
     auto at = std::lower_bound(block.touch.begin(), block.touch.end(), p,
                                [](const TouchPlanes& planes, size_t property) { return planes.property < property; });
     if (at == block.touch.end() || at->property != p)
       at = block.touch.insert(at, {uint16_t(p), map.store.new_plane(), map.store.new_plane(), map.store.new_plane()});
-    else
-      for (Plane* plane : {at->n, at->mean, at->m2}) std::memset(plane, 0, sizeof(Plane));
     accumulate(map, uint16_t(p), block.coord, *at);
   }
 }

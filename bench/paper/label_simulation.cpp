@@ -10,6 +10,7 @@
 #include "inference/decision.h"
 #include "inference/information_gain.h"
 #include "inference/material.h"
+#include "inference/mixture.h"
 #include "inference/priors.h"
 
 namespace felt::paper {
@@ -80,6 +81,22 @@ MaterialPosterior posterior(const LabelExperiment& e, const std::vector<Nig>& pr
     for (const double psi : readings) evidence[c] += log_evidence(prior[c], psi);
   unchanged.belief = class_posterior(vision, evidence);
   return unchanged;
+}
+
+/// Class belief after touches of a region by projected concentrations.
+Belief projected_belief(const std::vector<Nig>& prior, const SimulatedRegion& region, int touches) {
+  std::vector<double> a(kClasses, 1);
+  a[region.label] += 1;
+  std::vector<Nig> nig = prior;
+  for (int t = 0; t < touches; ++t) {
+    MixtureUpdate u = mixture_update(a, nig, region.reading[size_t(t)]);
+    a = std::move(u.a), nig = std::move(u.nig);
+  }
+  double total = 0;
+  for (const double x : a) total += x;
+  Belief belief;
+  for (size_t c = 0; c < kClasses; ++c) belief[c] = a[c] / total;
+  return belief;
 }
 
 /// Expected information of the next reading in a region.
@@ -154,7 +171,9 @@ Results results_of(const LabelExperiment& e, int regions_per_class) {
       // A region that is not touched keeps its label: what `told` knows is known of touched ones.
       Belief belief =
           vision_belief(touches[c][i] == 0 && e.vision == Vision::told ? Vision::paper : e.vision, region.label);
-      if (touches[c][i] > 0) {
+      if (e.projected_concentrations) {
+        belief = projected_belief(prior, region, touches[c][i]);
+      } else if (touches[c][i] > 0) {
         const auto p = posterior(e, prior, region, touches[c][i]).belief.p;
         std::copy(p.begin(), p.end(), belief.begin());
       }

@@ -23,8 +23,7 @@ constexpr int kShrink = 2, kGap = 6;
 
 void paste(const ColorImage& image, int left, int top, ColorImage& canvas) {
   for (int v = 0; v < image.height() / kShrink; ++v)
-    for (int u = 0; u < image.width() / kShrink; ++u)
-      canvas(left + u, top + v) = image(u * kShrink, v * kShrink);
+    for (int u = 0; u < image.width() / kShrink; ++u) canvas(left + u, top + v) = image(u * kShrink, v * kShrink);
 }
 
 /// The class's colour over a fainter picture, so that one sees what is labelled; black where there is no class.

@@ -41,7 +41,8 @@ Scores compare(const Map& map, const TriangleTree& tree, const std::vector<float
       pairs[n].push_back({truth, slot == ClassTable::kNoSlot ? -1 : slot});
     }
   });
-  std::vector<double> hit(size_t(k)), truth(size_t(k)), mapped(size_t(k));
+  const auto classes = size_t(k);
+  std::vector<double> hit(classes), truth(classes), mapped(classes);
   Scores scores;
   size_t all = 0, right = 0;
   for (const auto& of_block : pairs)

@@ -64,7 +64,9 @@ Experiment recorded_network(const std::string& name, const std::string& labels, 
   options.labels_dir = folder / labels;
   if (!confidence.empty()) options.probs_dir = folder / confidence;
   const auto predicted = open_sequence(folder, options), truth = open_sequence(folder, {.read_color = false});
-  Experiment e{confidence.empty() ? name + ", labels" : name + ", labels with confidence", predicted->info().classes};
+  Experiment e;
+  e.name = confidence.empty() ? name + ", labels" : name + ", labels with confidence";
+  e.classes = predicted->info().classes;
   for (int64_t i = 0; i < predicted->size(); ++i) {
     ReadResult frame = predicted->read(i), true_frame = truth->read(i);
     add(e, size_t(i), std::move(std::get<Frame>(frame)), std::move(std::get<Frame>(true_frame).labels));
@@ -74,7 +76,9 @@ Experiment recorded_network(const std::string& name, const std::string& labels, 
 
 Experiment simulated_network(const std::vector<Frame>& frames, const ClassTable& classes, const std::string& preset,
                              ErrorScale scale, const std::string& scale_name) {
-  Experiment e{"house, " + preset + " network, mistakes by " + scale_name, classes};
+  Experiment e;
+  e.name = "house, " + preset + " network, mistakes by " + scale_name;
+  e.classes = classes;
   const LabelNetwork network{preset_confusion(preset, classes), scale};
   for (size_t i = 0; i < frames.size(); ++i) {
     if (i % 4 == 3) continue;

@@ -44,12 +44,15 @@ std::optional<Eigen::Isometry3d> recorded_at(const RecordedTrajectory& trajector
 double axis_share(const PinholeCamera& camera, double u, double v) { return 1 / camera.ray(u, v).norm(); }
 
 PairScore score_pair(const SampledFrame& a, const SampledFrame& b, const Eigen::Isometry3d& T_b_a,
-                     const PinholeCamera& camera, const Reading& reading) {
+                     const PinholeCamera& camera, const Reading& reading, size_t every) {
   PairScore result;
   std::vector<double> residuals;
   size_t in_view = 0;
   double sum = 0;
-  for (const SampledFrame::Point& point : a.points) {
+  size_t total = 0;
+  for (size_t i = 0; i < a.points.size(); i += every) {
+    const SampledFrame::Point& point = a.points[i];
+    ++total;
     double z = point.depth_m * reading.depth_factor;
     if (reading.ray_length) z *= axis_share(camera, point.u, point.v);
     const Eigen::Vector3d p = T_b_a * (z * camera.ray(point.u, point.v));
@@ -65,9 +68,8 @@ PairScore score_pair(const SampledFrame& a, const SampledFrame& b, const Eigen::
     sum += point_score(residual);
     if (std::abs(residual) < 0.04) residuals.push_back(std::abs(residual));
   }
-  const double total = double(std::max<size_t>(1, a.points.size()));
-  result.score = sum / total;
-  result.in_view = double(in_view) / total;
+  result.score = sum / double(std::max<size_t>(1, total));
+  result.in_view = double(in_view) / double(std::max<size_t>(1, total));
   if (in_view > 0) result.meets = double(residuals.size()) / double(in_view);
   if (!residuals.empty()) {
     std::nth_element(residuals.begin(), residuals.begin() + residuals.size() / 2, residuals.end());
@@ -90,7 +92,7 @@ PinholeCamera camera_of(const PinholeCamera& camera, const Reading& reading) {
 
 std::vector<PairScore> cross_project(const std::vector<SampledFrame>& frames, const std::vector<Pair>& pairs,
                                      const RecordedTrajectory& trajectory, const PinholeCamera& camera,
-                                     const Reading& reading) {
+                                     const Reading& reading, int every) {
   const PinholeCamera read_camera = camera_of(camera, reading);
   std::vector<std::optional<Eigen::Isometry3d>> poses(frames.size());
   for (size_t i = 0; i < frames.size(); ++i)
@@ -101,7 +103,7 @@ std::vector<PairScore> cross_project(const std::vector<SampledFrame>& frames, co
     const auto [a, b] = pairs[i];
     if (poses[size_t(a)] && poses[size_t(b)])
       scores[i] = score_pair(frames[size_t(a)], frames[size_t(b)], poses[size_t(b)]->inverse() * *poses[size_t(a)],
-                             read_camera, reading);
+                             read_camera, reading, size_t(every));
   });
   return scores;
 }

@@ -58,10 +58,10 @@ struct PairScore {
 };
 
 /// Projects each pair's points of `a` into `b`. `camera` as read now. Pairs whose pose cannot be had (delay beyond the
-/// trajectory) score 0.
+/// trajectory) score 0. `every`: only each n-th point, for a search.
 std::vector<PairScore> cross_project(const std::vector<SampledFrame>& frames, const std::vector<Pair>& pairs,
                                      const RecordedTrajectory& trajectory, const PinholeCamera& camera,
-                                     const Reading& reading);
+                                     const Reading& reading, int every = 1);
 
 /// The camera as a reading changes it.
 PinholeCamera camera_of(const PinholeCamera& camera, const Reading& reading);

@@ -34,6 +34,11 @@ void append(std::vector<Finding>& to, std::vector<Finding> from) {
   to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
 }
 
+/// Faces of one scan do not overlap, and its points say how long they are: there is nothing to compare.
+bool of_range_sensor(const SequenceListing& listing) {
+  return listing.frames.front().depth.codec == ImageSource::Codec::scan;
+}
+
 Examination begin(const SequenceListing& listing) {
   Examination examination;
   examination.layout = listing.layout;
@@ -48,6 +53,7 @@ Examination examine_sequence(const fs::path& path, const SequenceOptions& option
   Examination examination = begin(listing);
   if (auto finding = check_stated_camera(listing)) examination.findings.push_back(std::move(*finding));
   append(examination.findings, check_files(listing));
+  if (of_range_sensor(listing)) return examination;
   append(examination.findings, check_depth_images(path, options, listing));
 
   Sample sample = take_sample(path, options, listing, {});
@@ -72,6 +78,7 @@ Examination examine_sequence(const fs::path& path, const SequenceOptions& option
 Examination examine_quickly(const fs::path& path, const SequenceOptions& options) {
   const SequenceListing listing = list_sequence(path, options);
   Examination examination = begin(listing);
+  if (of_range_sensor(listing)) return examination;
   const SamplePlan plan{.clusters = 3, .offsets = {0, 2, 6}, .whole_below = 9, .images = true};
   const Sample sample = take_sample(path, options, listing, plan);
   examination.sampled_frames = int64_t(sample.geometry.frames.size());

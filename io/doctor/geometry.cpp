@@ -15,7 +15,7 @@ public:
   Search(const GeometrySample& sample) : sample_(sample) {}
 
   std::vector<PairScore> scores(const Reading& reading) const {
-    return cross_project(sample_.frames, sample_.pairs, sample_.trajectory, sample_.camera, reading);
+    return cross_project(sample_.frames, sample_.pairs, sample_.trajectory, sample_.camera, reading, 3);
   }
   double value(const Reading& r) const {
     const Reading& now = sample_.now;

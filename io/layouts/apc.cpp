@@ -69,6 +69,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   if (!options.intrinsics) listing.intrinsics = info.color;  // depth is registered to colour
   listing.depth_encoding = DepthEncoding::rotated3;
   listing.depth_scale = 10000;
+  listing.voxel_size_m = 0.005;  // shelves half a metre away
   const auto depth = numbered_files(path, "frame-", {".depth.png"}),
              color = numbered_files(path, "frame-", {".color.png"});
   for (const auto& [number, file] : depth) {

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/pose.h"
 #include "io/camera_file.h"
 #include "io/class_table_file.h"
 #include "io/layouts.h"
@@ -37,6 +38,21 @@ public:
             node && node.IsScalar() ? "'" + node.Scalar() + "'" : "nothing");
     return 1;
   }
+  /// A list of one of these lengths; empty where the key is absent or wrong.
+  std::vector<double> numbers(const YAML::Node& parent, const char* key, const std::set<size_t>& lengths) {
+    const YAML::Node node = parent[key];
+    std::vector<double> list;
+    if (!node) return list;
+    for (const YAML::Node& item : node)
+      if (const auto number = item.IsScalar() ? parse_number(item.Scalar()) : std::nullopt;
+          number && std::isfinite(*number))
+        list.push_back(*number);
+    if (node.IsSequence() && list.size() == node.size() && lengths.contains(list.size())) return list;
+    problem(node, key,
+            "a list of " + std::to_string(*lengths.begin()) + " or " + std::to_string(*lengths.rbegin()) + " numbers",
+            "something else");
+    return {};
+  }
   void problem(const YAML::Node& node, const std::string& key, const std::string& expected, const std::string& found) {
     problems.push_back(
         describe_mismatch(file_.string() + ":" + std::to_string(node.Mark().line + 1), key, expected, found));
@@ -63,22 +79,37 @@ void read_settings(const fs::path& file, SequenceListing& listing, std::map<std:
     throw FormatError(describe_mismatch(file.string(), "content", "keys and values", "something else"));
   Settings settings(root, file);
   settings.refuse_unknown(root, {"camera", "color_camera", "depth_scale", "depth_encoding", "depth_is_ray_length",
-                                 "pose_convention", "paths", "name", "comment"});
+                                 "pose_convention", "paths", "name", "comment", "T_body_camera", "T_color_depth"});
+  const auto distortion_of = [&](const YAML::Node& node) {
+    const std::vector<double> numbers = settings.numbers(node, "distortion", {4, 5});
+    if (numbers.empty()) return Distortion{};
+    return Distortion{numbers[0], numbers[1], numbers[2], numbers[3], numbers.size() > 4 ? numbers[4] : 0};
+  };
+  const auto rigid = [&](const char* key) {
+    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+    const std::vector<double> numbers = settings.numbers(root, key, {12, 16});
+    if (!numbers.empty() && rigid_pose(matrix_of_numbers(numbers.data(), numbers.size()), T) != PoseFault::none)
+      settings.problem(root[key], key, "a rigid transform", "another matrix");
+    return T;
+  };
   const auto camera_of = [&](const YAML::Node& node, int& width, int& height) {
-    settings.refuse_unknown(node, {"fx", "fy", "cx", "cy", "width", "height"});
+    settings.refuse_unknown(node, {"fx", "fy", "cx", "cy", "width", "height", "distortion"});
     width = int(std::min(settings.positive(node, "width", std::nullopt), 1e6));
     height = int(std::min(settings.positive(node, "height", std::nullopt), 1e6));
     return Intrinsics{settings.positive(node, "fx", std::nullopt), settings.positive(node, "fy", std::nullopt),
                       settings.positive(node, "cx", std::nullopt), settings.positive(node, "cy", std::nullopt)};
   };
   if (const YAML::Node camera = root["camera"]; camera && camera.IsMap())
-    listing.intrinsics = camera_of(camera, listing.width, listing.height);
+    listing.intrinsics = camera_of(camera, listing.width, listing.height), listing.distortion = distortion_of(camera);
   else
     settings.problem(root, "camera", "{fx, fy, cx, cy, width, height}", "nothing");
   if (const YAML::Node camera = root["color_camera"]; camera && camera.IsMap()) {
     int width = 0, height = 0;
     listing.color_intrinsics = camera_of(camera, width, height);
+    listing.color_distortion = distortion_of(camera);
   }
+  listing.T_body_camera = rigid("T_body_camera");
+  listing.T_color_depth = rigid("T_color_depth").matrix();
   listing.depth_scale = settings.positive(root, "depth_scale", 1000);
   if (const YAML::Node flag = root["depth_is_ray_length"];
       flag && !YAML::convert<bool>::decode(flag, listing.depth_is_ray_length))

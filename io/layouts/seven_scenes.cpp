@@ -67,6 +67,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   if (camera.filename() == "camera-intrinsics.color.txt") {
     listing.depth_encoding = DepthEncoding::rotated3;
     listing.depth_scale = 10000;
+    listing.voxel_size_m = 0.005;
     listing.notes.push_back(
         "camera-intrinsics.color.txt marks a picking-challenge recording: depth is read as rotated3, 0.1 mm");
   }

@@ -46,7 +46,7 @@ struct TouchedFloor {
   TouchedFloor() {
     Map floor = labelled_map(
         0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
-        class_table({"wood", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 2; });
+        class_table({"wood", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 0 : 1; });
     Property friction;
     friction.name = "friction";
     friction.priors = {{"wood", {0.4, 0.05, 50}}, {"ice", {0.1, 0.03, 50}}};
@@ -73,6 +73,29 @@ std::set<std::tuple<int, int, int>> colors_of(const TriangleMesh& mesh) {
 }
 
 }  // namespace
+
+TEST_CASE("an HTML page holds the map's mesh and asks for nothing else") {
+  const TouchedFloor floor;
+  const fs::path page = floor.directory.path() / "floor.html";
+  const json written = floor.exported("--html " + quoted(page) + " --color-by friction.mean --up -y");
+  CHECK(written["html"]["path"] == page.string());
+  CHECK(written["html"]["bytes"] == fs::file_size(page));
+  std::ifstream in(page);
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  CHECK(text.starts_with("<!DOCTYPE html>"));
+  for (const char* outside : {"http:", "https:", "src=", "import ", "fetch("}) {
+    INFO(outside);
+    CHECK(text.find(outside) == std::string::npos);
+  }
+  const std::string opening = "<script id=\"scene\" type=\"application/json\">";
+  const size_t begin = text.find(opening) + opening.size();
+  const json scene = json::parse(text.substr(begin, text.find("</script>", begin) - begin));
+  CHECK(scene["vertices"] > 1000);
+  CHECK(scene["up"] == "-y");
+  CHECK(scene["low"][0].get<double>() == Approx(-0.4).margin(0.03));
+  CHECK(run_feltmap("export --force " + quoted(floor.map) + " --html " + quoted(page) + " --up sideways").exit_code ==
+        2);
+}
 
 TEST_CASE("a GLB file is what a reader that is not ours expects, for every kind of colour") {
   const TouchedFloor floor;

@@ -142,6 +142,35 @@ void read_frames_of(const fs::path& path, const std::string& format) {
 
 void read_sens(const std::string& bytes) { read_frames_of(as_file("scan.sens", bytes), "sens"); }
 
+void write_view(const fs::path& file) {
+  fs::create_directories(file.parent_path());
+  write_bytes(file, encode_png(Image<uint16_t>(8, 6, 1500)));
+}
+
+void read_apc_info(const std::string& bytes) {
+  write_view(scratch_folder() / "apc" / "frame-000000.depth.png");
+  as_file("apc/cam.info.txt", bytes);
+  read_frames_of(scratch_folder() / "apc", "apc");
+}
+
+void read_redwood_log(const std::string& bytes) {
+  write_view(scratch_folder() / "redwood" / "depth" / "0.png");
+  as_file("redwood/intrinsic.txt", "5 5 3.5 2.5\n");
+  as_file("redwood/trajectory.log", bytes);
+  read_frames_of(scratch_folder() / "redwood", "redwood");
+}
+
+void read_scan(const std::string& bytes) { read_frames_of(as_file("scan.bin", bytes), "lidar"); }
+
+void read_tum_lists(const std::string& bytes) {
+  write_view(scratch_folder() / "tum" / "depth" / "1.png");
+  as_file("tum/camera-intrinsics.txt", "5 5 3.5 2.5\n");
+  as_file("tum/groundtruth.txt", "1 0 0 0 0 0 0 1\n");
+  as_file("tum/depth.txt", bytes);
+  as_file("tum/rgb.txt", bytes);
+  read_frames_of(scratch_folder() / "tum", "tum");
+}
+
 /// One view of 8 x 6 pixels below the description.
 void read_sequence_yaml(const std::string& bytes) {
   const fs::path folder = scratch_folder() / "sequence";
@@ -167,6 +196,7 @@ constexpr size_t kFree = size_t(16) << 20, kText = 2000, kImage = size_t(1032) *
 constexpr size_t kMapFree = size_t(128) << 20, kMap = 200;
 
 constexpr Harness kHarnesses[] = {
+    {"apc_info", read_apc_info, kFree, kText},
     {"camera", read_camera, kFree, kText},
     {"classes_csv", read_classes_csv, kFree, kText},
     {"classes_yaml", read_classes_yaml, kFree, kText},
@@ -183,11 +213,14 @@ constexpr Harness kHarnesses[] = {
     {"poses", read_poses_text, kFree, kText},
     {"priors", read_priors, kFree, kText},
     {"properties", read_properties_yaml, kFree, kText},
+    {"redwood_log", read_redwood_log, kFree, kText},
+    {"scan", read_scan, kFree, kText},
     {"scene", read_scene_yaml, kFree, kText},
     {"sens", read_sens, kFree, kImage},
     {"sequence", read_sequence_yaml, kFree, kText},
     {"touch_journal", read_touch_journal, kFree, kText},
     {"touches", read_touches_csv, kFree, kText},
+    {"tum_lists", read_tum_lists, kFree, kText},
 };
 
 }  // namespace

@@ -107,7 +107,8 @@ double worst_over_bound(unsigned seed, size_t k, double location, double scale, 
       const MaterialPlanes& p = classes[c];
       const Nig& x = view.nig[c];
       see(std::abs(double(p.a[v]) - view.a[c]) / total);
-      see(std::abs(double(p.tau[v]) + p.tau_origin - x.tau) / std::sqrt(plug_in_variance(x)));
+      const double moved = std::abs(x.tau - prior[c].tau);  // may be thousands of spreads of the class
+      see(std::abs(double(p.tau[v]) + p.tau_origin - x.tau) / std::max(moved, std::sqrt(plug_in_variance(x))));
       see(relative_error(double(p.kappa[v]), x.kappa));
       see(relative_error(double(p.beta[v]), x.beta));
       see(relative_error(double(p.gamma[v]), x.gamma));

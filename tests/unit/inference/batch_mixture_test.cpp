@@ -66,7 +66,8 @@ std::vector<double> concentration_bound(const std::vector<double>& a, const Mixt
   double total = 0, sum = 0, stiffness = 0;
   for (size_t c = 0; c < k; ++c) {
     const double x = exact.a[c], r = exact.responsibility.p[c], least = std::min(r, exact.responsibility.not_p[c]);
-    change[c] = (of_r * least + 4 * 0x1p-24 * r) / a[c];
+    const double moved = std::abs(digamma_difference(a[c], x - a[c]));
+    change[c] = of_r * least / a[c] + 4 * 0x1p-24 * (r / a[c] + moved);
     slope[c] = 1 / (x * trigamma(x));
     sum += x * slope[c] * change[c];
     stiffness -= x * slope[c];

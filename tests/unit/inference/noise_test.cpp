@@ -51,7 +51,7 @@ TEST_CASE("several noisy readings of one region: where the closed form is used i
   const std::vector<double> pattern{-0.6, 1.1, 0.2, -1.3, 0.7};
   double worst_outside = 0;
   for (double rho : {0.0, 0.5}) {
-    for (double z : {0.0, 1.0, 3.0}) {
+    for (double z : {0.0, 1.0, 3.0, 6.0}) {
       for (double ratio : {0.01, 0.03, 0.1, 0.33, 1.0, 3.0, 10.0}) {
         const Nig prior{0, 50, 25, 25};
         const double noise = std::sqrt(ratio), common = z * std::sqrt(1 / prior.kappa + rho);

@@ -36,11 +36,12 @@ struct View {
   ReferenceView reference() const { return {&labels, &depth_m, 0.1, 4}; }
 };
 
-LabelScores scores_of(const Map& map, const View& view, const ClassTable& truth, bool images = false) {
+LabelScores scores_of(const Map& map, const View& view, const ClassTable& truth, bool images = false, double z = 0) {
   const RayCaster caster(map);
   const VoxelBeliefs beliefs(map);
   LabelScores scores(map.classes.size());
-  add_view(scores, predict_labels(caster, beliefs, kCamera, Eigen::Isometry3d::Identity(), 4), view.reference(),
+  const Eigen::Isometry3d T_world_camera(Eigen::Translation3d(0, 0, z));
+  add_view(scores, predict_labels(caster, beliefs, kCamera, T_world_camera, 4), view.reference(),
            TruthClasses(map.classes, truth), images);
   return scores;
 }
@@ -49,16 +50,21 @@ LabelScores scores_of(const Map& map, const View& view, const ClassTable& truth,
 
 TEST_CASE("labels of a view are counted by true and predicted class, pixels without depth or truth are not") {
   const Map map = two_walls();
-  // Seen from the origin the wall of 1.2 x 0.8 m covers all but the first and last rows (30 rows at 40 pixels a metre).
+  // Seen from the origin the wall covers the image.
   const LabelScores right = scores_of(map, View(1, 2), {});
   CHECK(right.counts.count(0, 0) == right.counts.count(1, 1));
   CHECK(right.counts.count(0, 1) + right.counts.count(1, 0) == 0);
   CHECK(right.counts.total() == 40 * 29);
-  CHECK(right.counts.without_prediction(0) > 0);  // below the wall
+  CHECK(right.counts.without_prediction(0) == 0);
   const LabelScores wrong = scores_of(map, View(1, 3), {});
   CHECK(wrong.counts.count(2, 1) == right.counts.count(1, 1));
   CHECK(wrong.counts.iou(2) == 0);
   CHECK(wrong.counts.mean_iou() == Approx(wrong.counts.iou(0) / 2));
+  // From a metre farther back it covers 0.6 m * 40 px / 2 m = 12 columns on either side, and 8 rows.
+  const LabelScores far = scores_of(map, View(1, 2), {}, false, -1);
+  CHECK(far.counts.total() == 40 * 29);
+  CHECK(double(far.counts.count(0, 0)) == Approx(12 * 16).epsilon(0.15));
+  CHECK(far.counts.without_prediction(0) == 20 * 29 - far.counts.count(0, 0));
   const LabelScores half = scores_of(map, View(0, 2), {});  // id 0 is ignored
   CHECK(half.counts.total() == 20 * 29);
 }

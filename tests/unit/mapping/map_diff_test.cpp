@@ -117,7 +117,7 @@ TEST_CASE("touches that only one map has, and regions that differ, are beyond ev
   const auto wall = [] {
     Map map = test::labelled_map(
         0.02, {-0.2, -0.2, -0.1}, {0.2, 0.2, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
-        test::class_table({"wood", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 2; });
+        test::class_table({"wood", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 0 : 1; });
     Property friction;
     friction.name = "friction";
     friction.priors = {{"wood", {0.4, 0.05, 50}}, {"ice", {0.1, 0.05, 50}}};

@@ -1,0 +1,62 @@
+#include "io/convert.h"
+
+#include <catch2/catch.hpp>
+
+#include "core/error.h"
+#include "io/open_sequence.h"
+#include "tests/support/data.h"
+#include "tests/support/recorded_sequence.h"
+
+using namespace felt;
+using namespace felt::test;
+namespace fs = std::filesystem;
+
+TEST_CASE("a converted sequence gives the frames it was made of, in every layout") {
+  const std::string layout = GENERATE(from_range(writable_layouts()));
+  INFO(layout);
+  TemporaryDirectory folder;
+  write_generic(folder.path() / "recording", 3);
+  const auto original = open_sequence(folder.path() / "recording");
+  const fs::path out = folder.path() / "con verted";
+  const ConvertResult result = convert_sequence(*original, out, {.layout = layout});
+  CHECK(result.written == 3);
+  CHECK(result.skipped.empty());
+  CHECK(result.depth_out_of_range == 0);
+
+  const auto converted = open_sequence(out);
+  CHECK(converted->info().layout == layout);
+  CHECK(converted->info().camera == original->info().camera);
+  REQUIRE(converted->size() == 3);
+  for (int64_t i = 0; i < 3; ++i) {
+    const auto before = std::get<Frame>(original->read(i)), after = std::get<Frame>(converted->read(i));
+    CHECK(after.T_world_camera.isApprox(before.T_world_camera, 1e-12));
+    CHECK(after.color == before.color);
+    for (size_t p = 0; p < before.depth_m.size(); ++p)
+      REQUIRE(std::abs(after.depth_m.data()[p] - before.depth_m.data()[p]) < 0.51 / converted->info().depth_scale);
+    if (converted->info().has_labels) CHECK(after.labels == before.labels);
+  }
+  CHECK(converted->info().has_labels == (layout != "tum" && layout != "redwood"));
+}
+
+TEST_CASE("conversion leaves nothing behind where it fails or is stopped, and replaces nothing") {
+  TemporaryDirectory folder;
+  write_generic(folder.path() / "recording", 2);
+  const auto reader = open_sequence(folder.path() / "recording");
+  const fs::path out = folder.path() / "out";
+  convert_sequence(*reader, out, {}, [](int64_t) { return false; });
+  CHECK_FALSE(fs::exists(out));
+  CHECK_THROWS_AS(convert_sequence(*reader, out, {.layout = "nonsense"}), ConfigError);
+  CHECK_THROWS_AS(convert_sequence(*reader, folder.path() / "recording", {}), IoError);
+  CHECK(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()) == 1);
+}
+
+TEST_CASE("depth that does not fit into 16 bits is counted and stored as missing") {
+  int64_t lost = 0;
+  DepthImage depth(3, 1);
+  depth(0, 0) = 1, depth(1, 0) = 14, depth(2, 0) = 0;
+  const Image<uint16_t> stored = stored_depth(depth, 5000, lost);
+  CHECK(stored(0, 0) == 5000);
+  CHECK(stored(1, 0) == 0);
+  CHECK(stored(2, 0) == 0);
+  CHECK(lost == 1);
+}

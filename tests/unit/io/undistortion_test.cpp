@@ -1,0 +1,101 @@
+#include "io/undistortion.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "core/error.h"
+#include "io/image_encode.h"
+#include "io/open_sequence.h"
+#include "tests/support/data.h"
+#include "tests/support/recorded_sequence.h"
+
+using namespace felt;
+using namespace felt::test;
+
+namespace {
+
+const PinholeCamera kCamera{20, 20, 11.5, 7.5, kWidth, kHeight};
+const Distortion kLens{-0.2, 0.05, 0.002, -0.003, 0.01};
+
+Frame only_frame(const std::filesystem::path& folder, const SequenceOptions& options = {}) {
+  return std::get<Frame>(open_sequence(folder, options)->read(0));
+}
+
+}  // namespace
+
+TEST_CASE("a ray falls where OpenCV's formula, worked out by hand, says") {
+  const PinholeCamera camera{525, 520, 319.5, 239.5, 640, 480};
+  // x = 0.3, y = -0.2: r^2 = 0.13, radial 1 - 0.026 + 0.000845 + 0.00002197, x' = 0.291290091, y' = -0.194193394.
+  const Eigen::Vector2d pixel = project_distorted(camera, kLens, 0.3, -0.2);
+  CHECK(pixel.x() == Approx(472.4272978).epsilon(1e-9));
+  CHECK(pixel.y() == Approx(138.5194351).epsilon(1e-9));
+  const Image<int32_t> map = undistortion_map(camera, kLens);
+  CHECK(map(477, 136) == 139 * 640 + 472);  // 0.3 525 + 319.5 = 477, -0.2 520 + 239.5 = 135.5
+}
+
+TEST_CASE("rays beyond the radius at which the model folds back show nothing") {
+  const Distortion strong{-0.5, 0, 0, 0, 0};  // r (1 - 0.5 r^2) is largest at r = sqrt(2 / 3)
+  CHECK(std::isfinite(project_distorted(kCamera, strong, 0.8, 0).x()));
+  CHECK(std::isnan(project_distorted(kCamera, strong, 0.83, 0).x()));
+}
+
+TEST_CASE("depth, colour and labels of a distorting lens are undistorted alike") {
+  TemporaryDirectory folder;
+  write_generic(folder.path(), 1);
+  const Frame plain = only_frame(folder.path()), straight = only_frame(folder.path(), {.distortion = kLens});
+  const Image<int32_t> map = undistortion_map(kCamera, kLens);
+  int moved = 0;
+  for (size_t p = 0; p < map.size(); ++p) {
+    const int32_t from = map.data()[p];
+    moved += from != int32_t(p);
+    CHECK(straight.depth_m.data()[p] == (from < 0 ? 0.0f : plain.depth_m.data()[from]));
+    CHECK(straight.color.data()[p] == (from < 0 ? Rgba8{0, 0, 0, 0} : plain.color.data()[from]));
+    CHECK(straight.labels.data()[p] == (from < 0 ? kNoLabel : plain.labels.data()[from]));
+  }
+  CHECK(moved > 50);
+  // The same from the sequence's own calibration.
+  write_text(folder.path() / "sequence.yaml",
+             "camera: {fx: 20, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16, "
+             "distortion: [-0.2, 0.05, 0.002, -0.003, 0.01]}\ndepth_scale: 2000\n");
+  CHECK(only_frame(folder.path()).depth_m == straight.depth_m);
+}
+
+TEST_CASE("colour of a camera beside the depth camera is taken where depth projects into it") {
+  TemporaryDirectory folder;
+  write_generic(folder.path(), 1);
+  // 5 cm to the right, of the same kind: a point at depth z moves 20 * 0.05 / z = 1 / z pixels to the left.
+  write_text(folder.path() / "sequence.yaml",
+             "camera: {fx: 20, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16}\ndepth_scale: 2000\n"
+             "color_camera: {fx: 20, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16}\n"
+             "T_color_depth: [1, 0, 0, -0.05, 0, 1, 0, 0, 0, 0, 1, 0]\n");
+  const Frame frame = only_frame(folder.path());
+  for (int u = 2; u < kWidth; ++u)
+    CHECK(int(frame.color(u, 3).r) == 10 * int(std::floor(u - 1 / depth_m_at(0, u) + 0.5)));
+}
+
+TEST_CASE("poses of a body are brought to its camera") {
+  TemporaryDirectory folder;
+  write_generic(folder.path(), 1);
+  Eigen::Isometry3d T_body_camera = Eigen::Isometry3d::Identity();
+  T_body_camera.linear() = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  T_body_camera.translation() << 0.1, 0.2, 0.3;
+  const Frame frame = only_frame(folder.path(), {.T_body_camera = T_body_camera});
+  CHECK(frame.T_world_camera.isApprox(pose_at(0) * T_body_camera, 1e-9));
+  write_text(folder.path() / "sequence.yaml",
+             "camera: {fx: 20, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16}\ndepth_scale: 2000\n"
+             "T_body_camera: [1, 0, 0, 0.1, 0, 0, -1, 0.2, 0, 1, 0, 0.3]\n");
+  CHECK(only_frame(folder.path()).T_world_camera.isApprox(pose_at(0) * T_body_camera, 1e-9));
+}
+
+TEST_CASE("calibration that is no lens or no transform is refused by name") {
+  CHECK(parse_distortion("0.1,-0.2,0,0", "here").k2 == -0.2);
+  CHECK_THROWS_WITH(parse_distortion("0.1,x,0,0", "--distortion"), Catch::Contains("--distortion"));
+  CHECK_THROWS_AS(parse_distortion("1,2,3", "here"), ConfigError);
+  TemporaryDirectory folder;
+  write_generic(folder.path(), 1);
+  write_text(folder.path() / "sequence.yaml",
+             "camera: {fx: 20, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16, distortion: [1, 2]}\n"
+             "T_body_camera: [2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]\n");
+  CHECK_THROWS_WITH(open_sequence(folder.path()),
+                    Catch::Contains("distortion") && Catch::Contains("T_body_camera") && Catch::Contains("rigid"));
+}
