@@ -44,7 +44,6 @@ struct LabelExperiment {
   /// Whether a reading changes what the next one is compared with. Algorithm 1 as printed never feeds the updated
   /// parameters back: several readings then weigh as the product of their evidences under the prior.
   bool fed_back = true;
-  bool projected_concentrations = false;  ///< class by the largest projected concentration, as the paper's update says
 };
 
 struct LabelOutcome {

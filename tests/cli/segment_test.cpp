@@ -101,7 +101,8 @@ TEST_CASE("segment does not mix images of different settings") {
   }
   std::ofstream(setting.folder.path() / "mine") << "x";
   const CommandResult foreign = run_feltmap("segment " + quoted(setting.sequence) + " --net " + quoted(setting.net) +
-                                            " --out " + quoted(setting.folder.path()));
+                                            " --classes " + quoted(setting.classes) + " --out " +
+                                            quoted(setting.folder.path()));
   CHECK(foreign.exit_code == 4);
   CHECK(fs::exists(setting.folder.path() / "mine"));
 }
