@@ -38,9 +38,6 @@ struct LabelExperiment {
   int touches = 0;         ///< of a region (`suggested`, `at_random`: on average)
   double true_rho = 0;     ///< correlation of the readings of a region
   double assumed_rho = 0;  ///< what the model thinks it is
-  /// The paper's Algorithm 1 read literally: the class is that of the largest projected concentration, from the paper's
-  /// vision prior.
-  bool projected_concentrations = false;
   /// Whether a reading changes what the next one is compared with. Algorithm 1 as printed never feeds the updated
   /// parameters back: several readings then weigh as the product of their evidences under the prior.
   bool fed_back = true;
