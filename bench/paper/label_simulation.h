@@ -41,6 +41,9 @@ struct LabelExperiment {
   /// Whether a reading changes what the next one is compared with. Algorithm 1 as printed never feeds the updated
   /// parameters back: several readings then weigh as the product of their evidences under the prior.
   bool fed_back = true;
+  /// The paper's Algorithm 1 read literally: the class is that of the largest projected concentration, from the paper's
+  /// vision prior.
+  bool projected_concentrations = false;
 };
 
 struct LabelOutcome {
