@@ -57,7 +57,7 @@ void add_label_options(CLI::App& command, LabelSettings& s) {
                   "Names, such as person: their pixels neither label nor build surface")
       ->delimiter(',')
       ->group(group);
-  // A flag bound to an optional would say "no" where it is absent, over the configuration file.
+  // A callback, because a flag bound to an optional is false, not absent, where it is not given.
   command
       .add_flag_callback(
           "--instances", [&s] { s.instances = true; }, "Keep the instance id of every voxel")

@@ -196,6 +196,7 @@ void warn_of_faults(const ReconstructOptions& options) {
 
 int run(const ReconstructArguments& arguments, CommonOptions common) {
   const auto start = Clock::now();
+  const InterruptGuard interrupt;  // from the start: a signal while the sequence opens counts too
   ReconstructOptions options = resolve(arguments, common.threads);
   common.threads = options.threads;
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(common.thread_count()));
@@ -230,7 +231,6 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
     save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, source.recording, config,
                     options.out / kMapName);
   };
-  const InterruptGuard interrupt;
   fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save, map, scratch,
        report.fusion);
   if (report.fusion.fused == 0 && report.fusion.stopped.empty())

@@ -48,15 +48,9 @@ nlohmann::ordered_json to_json(const ReconstructReport& report, const nlohmann::
                       {"ignored_pixels", fusion.ignored_pixels}};
   }
   json["peak_rss_bytes"] = report.peak_rss_bytes;
-  json["time_s"] = {{"total", report.total_s},
-                    {"decode", fusion.decode_s},
-                    {"network", fusion.network_s},
-                    {"vote", fusion.vote_s},
-                    {"wait_for_decode", fusion.wait_s},
-                    {"allocate", fusion.allocate_s},
-                    {"fuse", fusion.fuse_s},
-                    {"touch", report.touch_s},
-                    {"mesh", report.mesh_s},
+  json["time_s"] = {{"total", report.total_s}, {"decode", fusion.decode_s},        {"network", fusion.network_s},
+                    {"vote", fusion.vote_s},   {"wait_for_decode", fusion.wait_s}, {"allocate", fusion.allocate_s},
+                    {"fuse", fusion.fuse_s},   {"touch", report.touch_s},          {"mesh", report.mesh_s},
                     {"save", report.save_s}};
   json["fuse_ms"] = {{"mean", mean_ms}, {"p50", percentile(ms, 0.50)}, {"p95", percentile(ms, 0.95)}};
   json["threads"] = report.threads;

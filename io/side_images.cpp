@@ -52,8 +52,8 @@ std::vector<ImageSource> masks_in(const fs::path& folder) {
 
 }  // namespace
 
-void attach_images(const fs::path& folder, SequenceListing& listing, ImageSource FrameRecord::*member,
-                   const char* what, bool folders) {
+void attach_images(const fs::path& folder, SequenceListing& listing, ImageSource FrameRecord::*member, const char* what,
+                   bool folders) {
   const NamedImages images = images_in(folder, folders);
   bool any = false;
   for (FrameRecord& frame : listing.frames) {

@@ -22,10 +22,11 @@ const char* rule_name(RegionRule rule) {
 }
 
 RegionRule rule_of_name(const std::string& name) {
-  for (const RegionRule rule : {RegionRule::connected, RegionRule::mask, RegionRule::sphere, RegionRule::instance,
-                                RegionRule::segment})
+  for (const RegionRule rule :
+       {RegionRule::connected, RegionRule::mask, RegionRule::sphere, RegionRule::instance, RegionRule::segment})
     if (name == rule_name(rule)) return rule;
-  throw TouchError(describe_mismatch("region", "rule", "connected, mask, sphere, instance or segment", "'" + name + "'"));
+  throw TouchError(
+      describe_mismatch("region", "rule", "connected, mask, sphere, instance or segment", "'" + name + "'"));
 }
 
 void validate(const RegionSettings& s) {

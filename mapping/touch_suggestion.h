@@ -33,8 +33,8 @@ struct Suggestion {
 };
 
 /// Cuts the map's labelled surface into the regions that touches would update, in canonical order of their first voxel;
-/// each voxel belongs to the first region that reaches it. With the rule `segment` they are the map's segments, labelled
-/// or not. Regions below `min_voxels` are left out.
+/// each voxel belongs to the first region that reaches it. With the rule `segment` they are the map's segments,
+/// labelled or not. Regions below `min_voxels` are left out.
 std::vector<Region> segments(const Map& map, const RegionSettings& settings, size_t min_voxels);
 
 /// Segments ranked by expected information gain of a reading of `property` times area. Throws TouchError for an unknown

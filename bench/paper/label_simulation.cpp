@@ -119,7 +119,13 @@ std::vector<int> hand_out(const LabelExperiment& e, const std::vector<Nig>& prio
     return touches;
   }
   std::vector<double> worth;
-  for (const SimulatedRegion* r : population) worth.push_back(gain(posterior(e, prior, *r, 0)));
+  Belief untouched;  // only the label is known then
+  for (size_t label = 0; label < kClasses; ++label) {
+    SimulatedRegion region;
+    region.label = label;
+    untouched[label] = gain(posterior(e, prior, region, 0));
+  }
+  for (const SimulatedRegion* r : population) worth.push_back(untouched[r->label]);
   for (size_t i = 0; i < budget; ++i) {
     const auto best = size_t(std::max_element(worth.begin(), worth.end()) - worth.begin());
     ++touches[best];
@@ -210,6 +216,7 @@ LabelOutcome simulate_labels(const LabelExperiment& e, int regions_per_class) {
     for (size_t i = 0; i < results.belief[c].size(); ++i) {
       const Belief& belief = results.belief[c][i];
       right += results.right[c][i];
+      outcome.right.push_back(results.right[c][i]);
       outcome.calibration.add(belief, int(c));
       for (size_t j = 0; j < kClasses; ++j)
         entropy -= std::log(std::clamp(j == c ? belief[j] : 1 - belief[j], 1e-7, 1.0));
@@ -220,14 +227,13 @@ LabelOutcome simulate_labels(const LabelExperiment& e, int regions_per_class) {
   return outcome;
 }
 
-PairedDifference compare(const LabelExperiment& better, const LabelExperiment& worse, int regions_per_class) {
-  const Results a = results_of(better, regions_per_class), b = results_of(worse, regions_per_class);
-  double sum = 0, squares = 0, n = 0;
-  for (size_t c = 0; c < kClasses; ++c)
-    for (size_t i = 0; i < a.right[c].size(); ++i) {
-      const double d = double(a.right[c][i]) - double(b.right[c][i]);
-      sum += d, squares += d * d, ++n;
-    }
+PairedDifference compare(const LabelOutcome& better, const LabelOutcome& worse) {
+  double sum = 0, squares = 0;
+  const auto n = double(better.right.size());
+  for (size_t i = 0; i < better.right.size(); ++i) {
+    const double d = double(better.right[i]) - double(worse.right[i]);
+    sum += d, squares += d * d;
+  }
   const double mean = sum / n;
   return {mean, std::sqrt((squares / n - mean * mean) / n)};
 }

@@ -41,7 +41,9 @@ struct LabelExperiment {
   /// Whether a reading changes what the next one is compared with. Algorithm 1 as printed never feeds the updated
   /// parameters back: several readings then weigh as the product of their evidences under the prior.
   bool fed_back = true;
-  bool projected_concentrations = false;  ///< class by the largest projected concentration, as the paper's update says
+  /// The paper's Algorithm 1 read literally: the class is that of the largest projected concentration, from the paper's
+  /// vision prior.
+  bool projected_concentrations = false;
 };
 
 struct LabelOutcome {
@@ -49,6 +51,7 @@ struct LabelOutcome {
   int regions = 0;  ///< of each class
   CalibrationScores calibration;
   double binary_cross_entropy = 0;  ///< mean over regions and classes, nats
+  std::vector<uint8_t> right;       ///< region by region
   double macro() const;
   double macro_error() const;  ///< standard error
   /// Peak signal-to-noise ratio of the class probabilities against the truth, dB.
@@ -59,11 +62,11 @@ struct LabelOutcome {
 /// compared in pairs. In parallel; the same for any number of threads.
 LabelOutcome simulate_labels(const LabelExperiment& experiment, int regions_per_class);
 
-/// Share of regions that one experiment gets right and the other does not, less the other way round, and its standard
+/// Share of regions that one outcome has right and the other has not, less the other way round, with its standard
 /// error.
 struct PairedDifference {
   double difference = 0, error = 0;
 };
-PairedDifference compare(const LabelExperiment& better, const LabelExperiment& worse, int regions_per_class);
+PairedDifference compare(const LabelOutcome& better, const LabelOutcome& worse);
 
 }  // namespace felt::paper

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "bench/paper/experiments.h"
 #include "bench/paper/label_simulation.h"
@@ -40,7 +41,7 @@ LabelExperiment experiment(Places places, const Method& method, int touches, dou
   return {places, method.vision, method.printed_property_prior, touches, rho, assumed};
 }
 
-void both_protocols(int regions, Checks& checks) {
+void both_protocols(int regions, bool quick, Checks& checks) {
   print_header("places");
   print_row("—", 0, "vision only, the paper's belief",
             simulate_labels(experiment(Places::everywhere, kTheirVision, 0), regions));
@@ -81,11 +82,19 @@ void both_protocols(int regions, Checks& checks) {
                     0, 0, 1e-9);
     }
     run("at random", Places::at_random, kOurs);
-    run("by `suggest`", Places::suggested, kOurs);
-    const PairedDifference gain =
-        compare(experiment(Places::suggested, kOurs, touches), experiment(Places::everywhere, kOurs, touches), regions);
-    checks.better("places by `suggest` less each region equally, touches: " + std::to_string(touches), gain.difference,
-                  gain.error);
+    if (quick && touches != 1) continue;
+    // Two milliseconds a place: fewer regions, and the same ones where each is touched equally often.
+    const int fewer = quick ? 50 : 500;
+    const LabelOutcome suggested = simulate_labels(experiment(Places::suggested, kOurs, touches), fewer);
+    print_row("by `suggest`, fewer regions", touches, kOurs.name, suggested);
+    const LabelOutcome equal = simulate_labels(experiment(Places::everywhere, kOurs, touches), fewer);
+    print_row("everywhere, the same regions", touches, kOurs.name, equal);
+    const PairedDifference gain = compare(suggested, equal);
+    const std::string claim = "places by `suggest` less each region equally, touches: " + std::to_string(touches);
+    if (quick)
+      checks.not_worse(claim, gain.difference, gain.error);
+    else
+      checks.better(claim, gain.difference, gain.error);
   }
 }
 
@@ -93,17 +102,17 @@ void correlated_readings(int regions, Checks& checks) {
   std::printf("\nReadings correlated within a region (everywhere, calibrated vision and property prior):\n");
   print_header("correlation");
   for (const double rho : {0.5, 0.8})
-    for (const bool modelled : {false, true})
+    for (const bool modelled : {false, true}) {
+      LabelOutcome fewer;
       for (const int touches : {1, 2, 3, 4, 5}) {
         const LabelExperiment e = experiment(Places::everywhere, kOurs, touches, rho, modelled ? rho : 0);
         const LabelOutcome o = simulate_labels(e, regions);
         char name[16];
         std::snprintf(name, sizeof name, "%.1f", rho);
         print_row(name, touches, modelled ? "**ours**: modelled" : "taken as independent", o);
+        const LabelOutcome before = std::exchange(fewer, o);
         if (!modelled || touches == 1) continue;
-        LabelExperiment fewer = e;
-        --fewer.touches;
-        const PairedDifference step = compare(e, fewer, regions);
+        const PairedDifference step = compare(o, before);
         checks.not_worse(std::string("correlation ") + name + " modelled: touch " + std::to_string(touches) +
                              " over touch " + std::to_string(touches - 1),
                          step.difference, step.error);
@@ -113,6 +122,7 @@ void correlated_readings(int regions, Checks& checks) {
                         o.macro_error(), kExpected[touches - 1]);
         }
       }
+    }
 }
 
 /// Several touches as Algorithm 1 prints them: each compared with the prior, the updated parameters not fed back.
@@ -139,7 +149,7 @@ void without_feedback(int regions, Checks& checks) {
 void material_labels(const Options& options, Checks& checks) {
   const int regions = options.quick ? 400 : 20000;
   std::printf("\n## Material labels\n\n%d regions of each class; intervals are 1.96 standard errors.\n", regions);
-  both_protocols(regions, checks);
+  both_protocols(regions, options.quick, checks);
   correlated_readings(regions, checks);
   without_feedback(regions, checks);
 }

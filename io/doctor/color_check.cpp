@@ -6,11 +6,19 @@
 namespace felt {
 namespace {
 
-bool cold_scene(const ClassTable& classes) {
+/// Whether a tenth of what is labelled is of a class that is blue by nature.
+bool cold_scene(const std::vector<SampledFrame>& frames, const ClassTable& classes) {
+  std::vector<uint16_t> cold_ids;
   for (const ClassInfo& info : classes.classes())
     for (const char* cold : {"snow", "ice", "sky", "water", "sea"})
-      if (info.name == cold) return true;
-  return false;
+      if (info.name == cold) cold_ids.push_back(info.id);
+  if (cold_ids.empty()) return false;
+  int64_t cold = 0, labelled = 0;
+  for (const SampledFrame& frame : frames)
+    for (const uint16_t id : frame.labels)
+      if (classes.known(id)) ++labelled, cold += std::count(cold_ids.begin(), cold_ids.end(), id);
+  // Without labels the table alone must do.
+  return labelled == 0 || cold * 10 > labelled;
 }
 
 }  // namespace
@@ -32,10 +40,10 @@ std::optional<Finding> check_color_order(const std::vector<SampledFrame>& frames
   const double balance = warm / std::max(1.0, difference), contrast = difference / pixels;
   finding.evidence = "sum of R - B is " + number_text(balance, "%.2f") + " of the sum of |R - B|, which is " +
                      number_text(contrast, "%.1f") + " a pixel; warm scenes have 0.3 to 0.9";
-  const bool cold = cold_scene(classes);
+  const bool cold = cold_scene(frames, classes);
   // Nearly grey pictures tell nothing.
   if (contrast < 3 || std::abs(balance) < 0.2 || (cold && balance < 0)) {
-    finding.belief = cold ? "colour order cannot be told: the class table names snow, ice, sky or water"
+    finding.belief = cold ? "colour order cannot be told: snow, ice, sky or water may be in the pictures"
                           : "colour order cannot be told from these colours; RGB is assumed";
     return finding;
   }

@@ -194,9 +194,9 @@ TEST_CASE("a signal saves what is fused, says so and exits with 5") {
   for (const char* signal : {"INT", "TERM"}) {
     INFO(signal);
     fs::remove_all(out);
-    const CommandResult result =
-        run_feltmap_within("", "reconstruct " + quoted(sequence) + " --out " + quoted(out) + " --quiet",
-                           std::string(" & sleep 0.5; kill -") + signal + " $!; wait $!");
+    const CommandResult result = run_feltmap_within(
+        "", "reconstruct " + quoted(sequence) + " --out " + quoted(out) + " --quiet --checkpoint 10",
+        " & until [ -e " + quoted(out / "map.vdb") + " ]; do sleep 0.02; done; kill -" + signal + " $!; wait $!");
     CHECK(result.exit_code == 5);
     CHECK_THAT(result.err, Catch::Matchers::Contains("interrupted") && Catch::Matchers::Contains("saved"));
     const json report = json::parse(file_text(out / "report.json"));

@@ -100,8 +100,9 @@ TEST_CASE("segment does not mix images of different settings") {
     REQUIRE(first + second <= 65536);
   }
   std::ofstream(setting.folder.path() / "mine") << "x";
-  const CommandResult foreign = run_feltmap("segment " + quoted(setting.sequence) + " --net " + quoted(setting.net) +
-                                            " --out " + quoted(setting.folder.path()));
+  const CommandResult foreign =
+      run_feltmap("segment " + quoted(setting.sequence) + " --net " + quoted(setting.net) + " --classes " +
+                  quoted(setting.classes) + " --out " + quoted(setting.folder.path()));
   CHECK(foreign.exit_code == 4);
   CHECK(fs::exists(setting.folder.path() / "mine"));
 }

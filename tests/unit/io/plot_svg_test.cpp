@@ -60,7 +60,13 @@ TEST_CASE("densities of a touch are drawn before and after it, with the names of
           "rho": 0.5, "psi": [0.15], "names": ["snow", "ice"]})",
       "touch");
   REQUIRE(plots.size() == 2);
-  const PlotSeries &ice_before = plots[0].series[1], &ice_after = plots[1].series[1];
+  const auto ice = [](const Plot& plot) {
+    const auto found = std::find_if(plot.series.begin(), plot.series.end(),
+                                    [](const PlotSeries& s) { return s.name.rfind("ice ", 0) == 0; });
+    REQUIRE(found != plot.series.end());
+    return *found;
+  };
+  const PlotSeries ice_before = ice(plots[0]), ice_after = ice(plots[1]);
   CHECK(ice_before.name == "ice 0.500");
   // Before the touch both classes weigh half; afterwards the area under the density is ice's probability.
   const auto area = [](const PlotSeries& s) {

@@ -2,14 +2,12 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
-#include <vector>
 
 #include "core/class_table.h"
-#include "io/plot_svg.h"
 #include "mapping/evaluate_geometry.h"
 #include "mapping/evaluate_labels.h"
 
-namespace felt {
+namespace felt::apps {
 
 // Figures of an evaluation as JSON, and what each of them is (docs/evaluation.md). Figures that do not exist are null.
 
@@ -24,7 +22,4 @@ nlohmann::ordered_json label_definitions(const LabelScores& scores, const std::s
 nlohmann::ordered_json property_json(const PropertyScores& scores);
 nlohmann::ordered_json property_definitions();
 
-/// Reliability diagram: accuracy against confidence by bin, and the share of predictions in each bin.
-std::vector<Plot> reliability_plots(const CalibrationScores& scores);
-
-}  // namespace felt
+}  // namespace felt::apps
