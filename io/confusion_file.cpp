@@ -186,7 +186,7 @@ std::string confusion_counts_csv(std::span<const double> counts, const ClassTabl
   text += "\n";
   for (int i = 0; i < k; ++i) {
     text += classes.at_slot(i).name;
-    for (int j = 0; j < k; ++j) text += "," + number_text(counts[size_t(i) * size_t(k) + size_t(j)]);
+    for (int j = 0; j < k; ++j) text.append(1, ',').append(number_text(counts[size_t(i) * size_t(k) + size_t(j)]));
     text += "\n";
   }
   return text;
