@@ -121,7 +121,8 @@ TEST_CASE("an output folder that vanishes while frames are fused is an error tha
   const fs::path sequence = boxes_repeated(folder.path() / "sequence", 300), out = folder.path() / "out";
   const CommandResult result = run_feltmap_within(
       "", "reconstruct " + quoted(sequence) + " --out " + quoted(out) + " --quiet --checkpoint 50 --voxel-size 0.04",
-      " & until [ -e " + quoted(out / "map.vdb") + " ]; do sleep 0.02; done; rm -rf " + quoted(out) + "; wait $!");
+      " & until [ -e " + quoted(out / "map.vdb") + " ]; do sleep 0.02; done; mv " + quoted(out) + " " +
+          quoted(folder.path() / "gone") + "; wait $!");  // at once, where a recursive removal may meet a new file
   INFO(result.err);
   CHECK(result.exit_code == 4);
   CHECK_THAT(result.err, Contains(out.string()) && Contains("No such file or directory"));
