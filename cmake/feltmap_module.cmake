@@ -3,9 +3,9 @@ function(feltmap_compile_options target)
   target_compile_features(${target} PUBLIC cxx_std_20)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
   # -ffp-contract=off: the scalar code is the specification, and every SIMD target must round as it does.
-  # restrict, stringop-overflow, array-bounds: GCC 12 reports copies within std::string that cannot happen (GCC bug 105651).
+  # restrict, stringop-overflow, stringop-overread, array-bounds: GCC 12 reports copies within std::string that cannot happen (GCC bug 105651).
   # psabi: Eigen values passed by value warn about an ABI that no caller of ours depends on.
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wno-psabi "$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overflow;-Wno-array-bounds>" -ffp-contract=off
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wno-psabi "$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overflow;-Wno-array-bounds;-Wno-stringop-overread>" -ffp-contract=off
                          $<$<BOOL:${FELTMAP_WARNINGS_AS_ERRORS}>:-Werror>)
   if(CCACHE AND FELTMAP_PCH)
     target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)

@@ -54,15 +54,15 @@ double log_evidence_by_enumeration(const Nig& p, const std::vector<double>& psi,
   return peak + std::log(sum);
 }
 
-struct Region {
+struct ReadRegion {
   std::vector<double> belief, psi, noise;
   std::vector<Nig> prior;
 };
 
-Region random_region(std::mt19937& rng, int readings, double noise_scale) {
+ReadRegion random_region(std::mt19937& rng, int readings, double noise_scale) {
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;
-  Region r;
+  ReadRegion r;
   for (int c = 0; c < 3; ++c) {
     r.belief.push_back(0.1 + uniform(rng));
     const double nu = 2 + 60 * uniform(rng);
@@ -81,7 +81,7 @@ TEST_CASE("the material posterior is the enumeration over the region's class, to
   std::mt19937 rng(21);
   double worst = 0;
   for (int i = 0; i < 12; ++i) {
-    const Region r = random_region(rng, 1 + i % 8, 0);
+    const ReadRegion r = random_region(rng, 1 + i % 8, 0);
     const double rho = 0.19 * (i % 6);
     const MaterialPosterior found = material_posterior(r.belief, r.prior, r.psi, r.noise, rho);
     std::vector<double> weight;
@@ -104,7 +104,7 @@ TEST_CASE(
   std::mt19937 rng(22);
   double worst = 0;
   for (int i = 0; i < 8; ++i) {
-    Region r = random_region(rng, 1 + i % 5, 0.3);
+    ReadRegion r = random_region(rng, 1 + i % 5, 0.3);
     const double rho = 0.2 * (i % 5);
     for (const Nig& p : r.prior) {
       const MaterialClass found = quadrature_material_class(p, r.psi, r.noise, rho);
@@ -126,7 +126,7 @@ TEST_CASE(
 TEST_CASE("the exact next reading of a material is the ratio of its evidences") {
   std::mt19937 rng(23);
   for (int i = 0; i < 20; ++i) {
-    Region r = random_region(rng, 1 + i % 6, 0);
+    ReadRegion r = random_region(rng, 1 + i % 6, 0);
     const double rho = 0.19 * (i % 6), next = 0.45;
     const MaterialClass before = material_class(r.prior[0], statistics_of(r.psi), rho);
     std::vector<double> more = r.psi;
