@@ -258,7 +258,8 @@ LabelStats fuse_soft(const BandVoxels& band, const LabelView& view, Block& block
   if (pixels.any_left) {
     LabelStats left;
     for (int i = 0; i < band.count; ++i)
-      if (pixels.verdict[i] == SoftPixels::kLeft) fuse_soft_voxel(band.lane[i], band.pixel[i], view, planes, block, left);
+      if (pixels.verdict[i] == SoftPixels::kLeft)
+        fuse_soft_voxel(band.lane[i], band.pixel[i], view, planes, block, left);
     stats.voxels += left.voxels;
   }
   return stats;

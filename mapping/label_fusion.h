@@ -60,9 +60,9 @@ struct LabelStats {
 ///   exponential forgetting, so that a network that was wrong for long can be corrected.
 /// * Where the view has instances, every voxel of the band votes for its pixel's id.
 ///
-/// Creates planes for classes that the block sees for the first time. One task per block; any number of tasks, each with
-/// its own LabelFusion. A block's planes are rarely in a cache: `add` sends for what the block will need and fuses the
-/// block before it.
+/// Creates planes for classes that the block sees for the first time. One task per block; any number of tasks, each
+/// with its own LabelFusion. A block's planes are rarely in a cache: `add` sends for what the block will need and fuses
+/// the block before it.
 class LabelFusion {
 public:
   LabelFusion(const LabelView& view, BlockStore& store) : view_(view), store_(store) {}

@@ -23,9 +23,9 @@ inline constexpr int kListPadding = 16;
 /// by the block.
 struct BandVoxels {
   int count = 0;
-  uint32_t groups = 0;                                      ///< bit g: some voxel of [16 g, 16 g + 16) is in the list
-  LaneBits bits;                                            ///< the same voxels
-  alignas(64) int32_t lane[kBlockVoxels + kListPadding];    ///< voxel in the block, ascending
+  uint32_t groups = 0;                                     ///< bit g: some voxel of [16 g, 16 g + 16) is in the list
+  LaneBits bits;                                           ///< the same voxels
+  alignas(64) int32_t lane[kBlockVoxels + kListPadding];   ///< voxel in the block, ascending
   alignas(64) int32_t pixel[kBlockVoxels + kListPadding];  ///< v * width + u
 };
 
@@ -44,7 +44,7 @@ void fade_evidence_scalar(const LaneBits& lanes, std::span<Plane* const> planes,
 
 /// For each pixel of a list, the class that comes at one rank among its most probable ones.
 struct alignas(64) SoftRank {
-  int32_t slot[kBlockVoxels + kListPadding];          ///< `classes` where it takes no evidence
+  int32_t slot[kBlockVoxels + kListPadding];              ///< `classes` where it takes no evidence
   alignas(64) float amount[kBlockVoxels + kListPadding];  ///< probability, then evidence
 };
 
@@ -56,10 +56,10 @@ struct SoftPixels {
   bool spread = true;  ///< mass that was not kept goes to the other classes evenly
   std::vector<SoftRank> ranks;
 
-  int taken = 0, invalid = 0;  ///< pixels that add evidence, and that are no distribution
-  bool any_left = false;       ///< whether some verdict is `kLeft`
-  alignas(64) float even[kBlockVoxels + kListPadding];    ///< evidence for all classes together, evenly
-  alignas(64) float added[kBlockVoxels + kListPadding];   ///< all evidence of the pixel
+  int taken = 0, invalid = 0;                            ///< pixels that add evidence, and that are no distribution
+  bool any_left = false;                                 ///< whether some verdict is `kLeft`
+  alignas(64) float even[kBlockVoxels + kListPadding];   ///< evidence for all classes together, evenly
+  alignas(64) float added[kBlockVoxels + kListPadding];  ///< all evidence of the pixel
   /// kNothing: the pixel adds nothing; kLeft: nothing was worked out for it.
   enum Verdict : int32_t { kNothing, kAdds, kLeft };
   alignas(64) int32_t verdict[kBlockVoxels + kListPadding];
@@ -71,9 +71,9 @@ inline constexpr float kMostProbability = 1.001f;
 inline float rounded_mass(int top) { return float(top) / 65535.0f; }
 
 /// Turns probabilities into what each pixel adds by the rule of LabelFusion, where that is plain: no class is named
-/// twice, and none that is named is less probable than those that are not. Where nothing is to be added the slot becomes
-/// `classes`. Other pixels are left to the caller, whose rule is the specification; the scalar version leaves all of
-/// them. Padding is overwritten.
+/// twice, and none that is named is less probable than those that are not. Where nothing is to be added the slot
+/// becomes `classes`. Other pixels are left to the caller, whose rule is the specification; the scalar version leaves
+/// all of them. Padding is overwritten.
 void weigh_probabilities(SoftPixels& pixels) noexcept;
 void weigh_probabilities_scalar(SoftPixels& pixels) noexcept;
 

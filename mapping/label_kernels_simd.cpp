@@ -58,8 +58,8 @@ void select_band(const BlockObservation& observation, float band_m, BandVoxels& 
     const int group = __builtin_ctz(rest), first = group * kGroupVoxels;
     const int before = count;
     for (int i = first; i < first + kGroupVoxels; i += lanes) {
-      const FloatMask near = hn::And(mask_of(bits_at(observation.valid, i)),
-                                     hn::Lt(hn::Abs(hn::Load(kF, observation.sdf_m + i)), limit));
+      const FloatMask near =
+          hn::And(mask_of(bits_at(observation.valid, i)), hn::Lt(hn::Abs(hn::Load(kF, observation.sdf_m + i)), limit));
       const unsigned bits = bits_of(near);
       if (bits == 0) continue;
       put_bits(bits, band.bits.row, i);
@@ -135,8 +135,9 @@ void weigh_probabilities(SoftPixels& pixels) {
         const auto slot = hn::Load(kI, rank.slot + i);
         FloatMask special = hn::Lt(hn::Load(kF, rank.amount + i), share);
         for (size_t before = 0; before < r; ++before)
-          special = hn::Or(special, hn::And(hn::Gt(hn::Load(kF, pixels.ranks[before].amount + i), zero),
-                                            hn::RebindMask(kF, hn::Eq(hn::Load(kI, pixels.ranks[before].slot + i), slot))));
+          special =
+              hn::Or(special, hn::And(hn::Gt(hn::Load(kF, pixels.ranks[before].amount + i), zero),
+                                      hn::RebindMask(kF, hn::Eq(hn::Load(kI, pixels.ranks[before].slot + i), slot))));
         left = hn::Or(left, hn::And(names(rank, i, pixels.classes), special));
       }
       left = hn::And(left, hn::And(take, spread));

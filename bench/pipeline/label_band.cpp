@@ -154,7 +154,8 @@ void run(const std::string& name, const std::vector<Frame>& frames, const House&
 int main() {
   apply_simd_choice();
   const std::filesystem::path folder = bench::recorded("house_living_rendered");
-  const std::vector<Frame> exact = bench::decoded("house_living_rendered", {.frames = {.step = 2}, .read_color = false});
+  const std::vector<Frame> exact =
+      bench::decoded("house_living_rendered", {.frames = {.step = 2}, .read_color = false});
   const TriangleMesh mesh = read_mesh(folder / "gt_mesh.ply");
   const std::vector<float>* face_class = TriangleMesh::find(mesh.triangle_scalars, "semantic");
   if (face_class == nullptr) {

@@ -1,6 +1,7 @@
-// What classes cost over geometry alone in processor time: one thread, 2 cm, for hard labels and for the three most probable classes, by
-// number of classes in the table; and the bytes they take. Labels are those of a recorded sequence, by default the
-// rendered house. The maps that are timed are compared with what the scalar kernels make of the same frames.
+// What classes cost over geometry alone in processor time: one thread, 2 cm, for hard labels and for the three most
+// probable classes, by number of classes in the table; and the bytes they take. Labels are those of a recorded
+// sequence, by default the rendered house. The maps that are timed are compared with what the scalar kernels make of
+// the same frames.
 //   bench_label_fusion [sequence]
 #include <tbb/global_control.h>
 

@@ -154,7 +154,7 @@ TEST_CASE("vertices carry the probability of their class and its entropy, whatev
     floor.exported("--mesh " + quoted(file) + " --color-by " + color);
     const TriangleMesh mesh = read_mesh(file);
     const std::vector<float>*probability = TriangleMesh::find(mesh.scalars, "label_prob"),
-                            *entropy = TriangleMesh::find(mesh.scalars, "entropy");
+          *entropy = TriangleMesh::find(mesh.scalars, "entropy");
     REQUIRE(probability != nullptr);
     REQUIRE(entropy != nullptr);
     CHECK(std::ranges::count(mesh.scalars, "entropy", &MeshScalars::name) == 1);
@@ -165,8 +165,7 @@ TEST_CASE("vertices carry the probability of their class and its entropy, whatev
       vertices.push_back(i);
     }
     asked.close();
-    const CommandResult answers =
-        run_feltmap("query --json " + quoted(floor.map) + " --file " + quoted(points));
+    const CommandResult answers = run_feltmap("query --json " + quoted(floor.map) + " --file " + quoted(points));
     REQUIRE(answers.exit_code == 0);
     const json believed = json::parse(answers.out).at("points");
     for (size_t n = 0; n < vertices.size(); ++n) {
