@@ -16,10 +16,12 @@ namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-/// What is known of a voxel that a colour may show.
+/// What is known of a voxel.
 struct Known {
-  uint16_t slot = ClassTable::kNoSlot;
+  ClassBelief belief;
   float value = kNan;  ///< of the ramp
+
+  bool labelled() const { return belief.slot != ClassTable::kNoSlot; }
 };
 
 /// What a colour shows of a voxel.
@@ -32,9 +34,9 @@ public:
 
   Known at(const Index3& voxel) const {
     const ClassBelief belief = class_belief_at(map_, *touched_, voxel);
-    if (!property_) return {belief.slot, belief.slot == ClassTable::kNoSlot ? kNan : belief.entropy};
+    if (!property_) return {belief, belief.slot == ClassTable::kNoSlot ? kNan : belief.entropy};
     const PropertyEstimate estimate = property_->at(voxel);
-    return {belief.slot, color_.source == SurfaceColor::Source::mean ? estimate.mean : estimate.sd};
+    return {belief, color_.source == SurfaceColor::Source::mean ? estimate.mean : estimate.sd};
   }
 
 private:
@@ -58,11 +60,6 @@ ColorRange range_of(const Map& map, const SurfaceColor& color, const std::vector
   for (const Known& k : known)
     if (std::isfinite(k.value)) range = {std::min(range.low, k.value), std::max(range.high, k.value)};
   return range.low <= range.high ? range : ColorRange{};
-}
-
-std::string scalar_name(const Map& map, const SurfaceColor& color) {
-  if (color.property < 0) return "entropy";
-  return map.properties[color.property].name + (color.source == SurfaceColor::Source::mean ? "_mean" : "_sd");
 }
 
 }  // namespace
@@ -97,24 +94,29 @@ std::optional<ColorRange> color_surface(const Map& map, const std::vector<Vertex
   const SurfaceBeliefs beliefs(map, color);
   known.resize(edges.size());
   tbb::parallel_for(size_t(0), edges.size(), [&](size_t i) { known[i] = beliefs.at(nearest_voxel(edges[i])); });
-  const auto seen = [](const Known& k) { return k.slot != ClassTable::kNoSlot; };
-  mesh.labels.resize(known.size());
-  for (size_t i = 0; i < known.size(); ++i) mesh.labels[i] = seen(known[i]) ? map.classes.at_slot(known[i].slot).id : 0;
+  MeshScalars probability{"label_prob", {}}, entropy{"entropy", {}};
+  for (const Known& k : known) {
+    mesh.labels.push_back(k.labelled() ? map.classes.at_slot(k.belief.slot).id : 0);
+    probability.values.push_back(k.labelled() ? k.belief.probability : kNan);
+    entropy.values.push_back(k.labelled() ? k.belief.entropy : kNan);
+  }
+  mesh.scalars.push_back(std::move(probability));
+  mesh.scalars.push_back(std::move(entropy));
   if (color.source == Source::rgb) return std::nullopt;
 
   mesh.colors.assign(known.size(), kNothingKnown);
   if (color.source == Source::classes) {
     for (size_t i = 0; i < known.size(); ++i)
-      if (seen(known[i])) mesh.colors[i] = map.classes.at_slot(known[i].slot).color;
+      if (known[i].labelled()) mesh.colors[i] = map.classes.at_slot(known[i].belief.slot).color;
     return std::nullopt;
   }
   const ColorRange range = range_of(map, color, known);
   const float span = range.high > range.low ? range.high - range.low : 1.0f;
-  MeshScalars scalars{scalar_name(map, color), {}};
-  for (size_t i = 0; i < known.size(); ++i) {
-    scalars.values.push_back(known[i].value);
+  for (size_t i = 0; i < known.size(); ++i)
     if (std::isfinite(known[i].value)) mesh.colors[i] = heat((known[i].value - range.low) / span);
-  }
+  if (color.property < 0) return range;
+  MeshScalars scalars{map.properties[color.property].name + (color.source == Source::mean ? "_mean" : "_sd"), {}};
+  for (const Known& k : known) scalars.values.push_back(k.value);
   mesh.scalars.push_back(std::move(scalars));
   return range;
 }

@@ -31,9 +31,10 @@ Index3 nearest_voxel(const VertexEdge& edge);
 /// Gives every vertex the colour of what is believed of the voxel nearest to it: of its class by the class table, of
 /// entropy (nats, from 0 to the most that as many classes can have) and of the mean or standard deviation of the next
 /// reading (unit of the property, from the least to the greatest on the surface) by a ramp from black over red to
-/// yellow, and grey where nothing is known. Sets `labels` to class ids (0: nothing known) where the map has classes,
-/// and appends what a ramp shows to `scalars` as "entropy", "<property>_mean" or "<property>_sd". `edges`: of
-/// `extract_mesh`. Returns the range of the ramp; nothing for rgb and class. Vision and touches count alike.
+/// yellow, and grey where nothing is known. Where the map has classes, whatever the colour: sets `labels` to class ids
+/// (0: nothing known) and appends "label_prob" (probability of that class) and "entropy" (nats) to `scalars`, NaN where
+/// nothing is known. Appends what a ramp shows as "<property>_mean" or "<property>_sd". `edges`: of `extract_mesh`.
+/// Returns the range of the ramp; nothing for rgb and class. Vision and touches count alike.
 std::optional<ColorRange> color_surface(const Map& map, const std::vector<VertexEdge>& edges, const SurfaceColor& color,
                                         TriangleMesh& mesh);
 

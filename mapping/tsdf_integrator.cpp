@@ -143,7 +143,7 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
   tbb::parallel_for(tbb::blocked_range<size_t>(0, coords.size(), 16), [&](const tbb::blocked_range<size_t>& range) {
     BlockObservation observation;
     size_t observed = 0;
-    LabelStats label_stats;
+    LabelFusion fusion(labels, map.store);
     uint64_t next_cubes = cubes_in_band(coords[range.begin()], view);
     for (size_t n = range.begin(); n < range.end(); ++n) {
       Block& block = map.store[scratch.blocks[n]];
@@ -156,8 +156,9 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
       ++observed;
       fuse_tsdf(observation, view.max_weight, *block.geometry);
       if (block.color != nullptr && rgba != nullptr) fuse_color(observation, rgba, color_band_m, *block.color);
-      if (labelled) label_stats += fuse_labels(observation, labels, block, map.store);
+      if (labelled) fusion.add(observation, block);
     }
+    const LabelStats label_stats = fusion.finish();
     updated.fetch_add(observed, std::memory_order_relaxed);
     label_voxels.fetch_add(label_stats.voxels, std::memory_order_relaxed);
     label_unknown.fetch_add(label_stats.unknown, std::memory_order_relaxed);

@@ -146,6 +146,38 @@ TEST_CASE("colours of a surface say what is believed, and the scale is stated") 
   CHECK_THAT(unknown.err, Contains("friction.mean") && Contains("stiffness.mean"));
 }
 
+TEST_CASE("vertices carry the probability of their class and its entropy, whatever the colour shows") {
+  const TouchedFloor floor;
+  const fs::path file = floor.directory.path() / "floor.ply", points = floor.directory.path() / "points.csv";
+  for (const char* color : {"rgb", "class", "entropy", "friction.mean"}) {
+    INFO(color);
+    floor.exported("--mesh " + quoted(file) + " --color-by " + color);
+    const TriangleMesh mesh = read_mesh(file);
+    const std::vector<float>*probability = TriangleMesh::find(mesh.scalars, "label_prob"),
+          *entropy = TriangleMesh::find(mesh.scalars, "entropy");
+    REQUIRE(probability != nullptr);
+    REQUIRE(entropy != nullptr);
+    CHECK(std::ranges::count(mesh.scalars, "entropy", &MeshScalars::name) == 1);
+    std::ofstream asked(points);
+    std::vector<size_t> vertices;
+    for (size_t i = 0; i < mesh.positions.size(); i += mesh.positions.size() / 20) {
+      asked << mesh.positions[i].x() << "," << mesh.positions[i].y() << "," << mesh.positions[i].z() << "\n";
+      vertices.push_back(i);
+    }
+    asked.close();
+    const CommandResult answers = run_feltmap("query --json " + quoted(floor.map) + " --file " + quoted(points));
+    REQUIRE(answers.exit_code == 0);
+    const json believed = json::parse(answers.out).at("points");
+    for (size_t n = 0; n < vertices.size(); ++n) {
+      const json& b = believed.at(n);
+      const size_t i = vertices[n];
+      CHECK(mesh.labels[i] == (b.at("class") == "wood" ? 1 : 2));
+      CHECK((*probability)[i] == Approx(b.at("class_probability").at(b.at("class").get<std::string>()).get<double>()));
+      CHECK((*entropy)[i] == Approx(b.at("class_entropy").get<double>()).margin(1e-6));
+    }
+  }
+}
+
 TEST_CASE("a class, a box and a segment cut the surface and the grids where they end") {
   const TouchedFloor floor;
   const fs::path ply = floor.directory.path() / "part.ply", vdb = floor.directory.path() / "part.vdb";
