@@ -116,8 +116,8 @@ int main(int argc, char** argv) {
   std::vector<Frame> colored = bench::decoded(argc > 1 ? argv[1] : "7scenes_redkitchen");
   std::vector<Frame> frames = colored;
   for (Frame& frame : frames) frame.color = {};
-  std::printf("%zu frames of %dx%d, SIMD %s, weights constant, default distance, depth to 4 m\n",
-              frames.size(), frames[0].depth_m.width(), frames[0].depth_m.height(), simd_name().c_str());
+  std::printf("%zu frames of %dx%d, SIMD %s, weights constant, default distance, depth to 4 m\n", frames.size(),
+              frames[0].depth_m.width(), frames[0].depth_m.height(), simd_name().c_str());
   std::printf(
       "| voxel | threads | colour | allocate ms | fuse ms | frame ms | first third | last third | blocks a frame | "
       "ns/voxel | map blocks | bytes/voxel | as two FloatGrids |\n");

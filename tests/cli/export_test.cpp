@@ -113,6 +113,19 @@ TEST_CASE("a GLB file is what a reader that is not ours expects, for every kind 
     CHECK(found.at("NORMAL")[2] == vertices);
     CHECK(std::stoul(found.at("indices")[2]) == 3 * written["mesh"]["triangles"].get<size_t>());
     CHECK(std::stoul(found["indices"][4]) + 1 == written["mesh"]["vertices"].get<size_t>());
+    // What is believed comes along whatever the colours show.
+    for (const char* attribute : {"_LABEL", "_FRICTION_MEAN", "_FRICTION_SD", "_TOUCHED"}) {
+      INFO(attribute);
+      REQUIRE(found.count(attribute) == 1);
+      CHECK(found[attribute][0] == "1");
+      CHECK(found[attribute][1] == "5126");
+      CHECK(found[attribute][2] == vertices);
+    }
+    CHECK(found["_TOUCHED"][3] == "0");
+    CHECK(found["_TOUCHED"][4] == "1");
+    CHECK(std::stod(found["_FRICTION_MEAN"][3]) < 0.2);
+    CHECK(std::stod(found["_FRICTION_MEAN"][4]) > 0.28);
+    CHECK(found.count("_ENTROPY") == (std::string(color) == "entropy"));
     if (std::string(color) == "rgb") continue;  // the floor was never photographed
     CHECK(found.at("COLOR_0")[0] == "4");
     CHECK(found["COLOR_0"][2] == vertices);
@@ -176,6 +189,57 @@ TEST_CASE("vertices carry the probability of their class and its entropy, whatev
       CHECK((*entropy)[i] == Approx(b.at("class_entropy").get<double>()).margin(1e-6));
     }
   }
+}
+
+TEST_CASE("every exported mesh says what is believed of each property and where it was touched") {
+  const TouchedFloor floor;
+  const auto examine = [](const fs::path& file) {
+    INFO(file);
+    const TriangleMesh mesh = read_mesh(file);
+    REQUIRE_FALSE(mesh.positions.empty());
+    const auto *mean = TriangleMesh::find(mesh.scalars, "friction_mean"),
+               *sd = TriangleMesh::find(mesh.scalars, "friction_sd"),
+               *touched = TriangleMesh::find(mesh.scalars, "touched");
+    REQUIRE((mean != nullptr && sd != nullptr && touched != nullptr));
+    CHECK(mesh.scalars.size() == 5);
+    REQUIRE(mesh.labels.size() == mesh.positions.size());
+    for (size_t i = 0; i < mesh.positions.size(); ++i) {
+      const float x = mesh.positions[i].x();
+      if (std::abs(x) < 0.05f) continue;
+      CHECK(mesh.labels[i] == (x < 0 ? 1 : 2));
+      CHECK((*touched)[i] == (x < 0 ? 0.0f : 1.0f));
+      CHECK(((*mean)[i] > 0.28f) == (x < 0));
+      CHECK((*sd)[i] > 0);
+    }
+  };
+  const fs::path whole = floor.directory.path() / "whole.ply", points = floor.directory.path() / "points.ply",
+                 region = floor.directory.path() / "region.ply";
+  floor.exported("--mesh " + quoted(whole) + " --points " + quoted(points));
+  examine(whole);
+  examine(points);
+  REQUIRE(run_feltmap("region " + quoted(floor.map) + " --at 0.2,0,0 --mesh " + quoted(region)).exit_code == 0);
+  examine(region);
+}
+
+TEST_CASE("a GLB file holds 0 where nothing is known of a property, and says so") {
+  const TemporaryDirectory folder;
+  Map floor = labelled_map(
+      0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); }, class_table({"wood"}),
+      [](const Eigen::Vector3d& p) { return p.x() < 0 ? 0 : -1; });
+  Property warmth;
+  warmth.name = "surface-warmth";
+  warmth.priors = {{"wood", {-3, 0.5, 50}}};
+  floor.properties = PropertyTable({warmth});
+  const fs::path map = folder.path() / "map.vdb", file = folder.path() / "floor.glb";
+  save_map(floor, map);
+  REQUIRE(run_feltmap("export " + quoted(map) + " --mesh " + quoted(file)).exit_code == 0);
+  auto found = lines_of("stock_glb_reader", file);
+  REQUIRE(found.at("_SURFACE_WARMTH_MEAN").size() == 5);
+  CHECK(std::stod(found["_SURFACE_WARMTH_MEAN"][3]) == Approx(-3));
+  CHECK(found["_SURFACE_WARMTH_MEAN"][4] == "0");
+  CHECK(found.at("_SURFACE_WARMTH_MEAN_KNOWN")[3] == "0");
+  CHECK(found.at("_SURFACE_WARMTH_MEAN_KNOWN")[4] == "1");
+  CHECK(found.count("_TOUCHED_KNOWN") == 0);
 }
 
 TEST_CASE("a class, a box and a segment cut the surface and the grids where they end") {
