@@ -14,6 +14,7 @@
 #include <cstring>
 #include <new>
 #include <sstream>
+#include <stdexcept>
 #include <vector>
 
 #include "io/atomic_file.h"
@@ -119,15 +120,15 @@ size_t halve(const Value* values, size_t count, char* to) {
   using Convert = vdb_io::RealToHalf<Value>;
   using Half = typename Convert::HalfT;
   for (size_t i = 0; i < count; ++i) {
-    const Half half = Convert::convert(values[i]);
-    std::memcpy(to + i * sizeof(Half), &half, sizeof half);
+    const Half number = Convert::convert(values[i]);
+    std::memcpy(to + i * sizeof(Half), &number, sizeof number);
   }
   return count * sizeof(Half);
 }
 
 /// A leaf's place among the values of a grid: mask, how inactive values are told, values. At most kMostOfLeaf bytes.
 template <typename Value>
-char* put_leaf(const BlockMask& active, const Value& background, VdbCodec codec, bool half, Scratch& scratch,
+char* put_leaf(const BlockMask& active, const Value& background, VdbCodec codec, bool in_16_bits, Scratch& scratch,
                char* to) {
   const Value* values = reinterpret_cast<const Value*>(scratch.values.data());
   size_t count = size_t(active.count());
@@ -145,7 +146,7 @@ char* put_leaf(const BlockMask& active, const Value& background, VdbCodec codec,
   to += sizeof active.word;
   *to++ = char(code);
   constexpr size_t kNumber = std::is_same_v<Value, openvdb::Vec3s> ? sizeof(float) : sizeof(Value);
-  if (half && vdb_io::RealToHalf<Value>::isReal) {
+  if (in_16_bits && vdb_io::RealToHalf<Value>::isReal) {
     const size_t bytes = halve(values, count, scratch.halves.data());
     return put_values(codec, scratch, scratch.halves.data(), bytes, kNumber / 2, to);
   }
@@ -182,13 +183,13 @@ struct Statistics {
 /// The tree above the values. `order`: the leaves that there are, in the order of a tree.
 template <typename Value>
 std::string topology(const std::vector<BlockCoord>& coords, const std::vector<uint32_t>& order,
-                     const std::vector<BlockMask>& masks, Value background, VdbCodec codec, bool half,
+                     const std::vector<BlockMask>& masks, Value background, VdbCodec codec, bool in_16_bits,
                      Statistics& statistics) {
   constexpr int kLower = kLowerLog2, kUpper = kLowerLog2 + kUpperLog2;  // log2 of blocks along an edge
   const auto node_of = [](const BlockCoord& c, int shift) { return Index3{c.x >> shift, c.y >> shift, c.z >> shift}; };
   std::string tree;
   append(tree, int32_t(1));  // buffers
-  append(tree, half ? vdb_io::truncateRealToHalf(background) : background);
+  append(tree, in_16_bits ? vdb_io::truncateRealToHalf(background) : background);
   append(tree, uint32_t(0));  // tiles
   uint32_t roots = 0;
   for (size_t i = 0; i < order.size(); ++i)
@@ -265,15 +266,15 @@ struct VdbWriter::State {
 
   /// Everything of a grid before its values, of which there are `value_bytes`.
   void put_head(const LeafGrid& grid, const std::string& tree, const Statistics& statistics, int64_t memory_bytes,
-                uint64_t value_bytes, VdbCodec codec, bool half) {
+                uint64_t value_bytes, VdbCodec codec, bool in_16_bits) {
     const openvdb::GridBase::Ptr stock = stock_grid_without_leaves(grid);
-    if (half) stock->setSaveFloatAsHalf(true);
+    if (in_16_bits) stock->setSaveFloatAsHalf(true);
     stock->insertMeta(openvdb::GridBase::META_FILE_BBOX_MIN, openvdb::Vec3IMetadata(statistics.bounds.min().asVec3i()));
     stock->insertMeta(openvdb::GridBase::META_FILE_BBOX_MAX, openvdb::Vec3IMetadata(statistics.bounds.max().asVec3i()));
     stock->insertMeta(openvdb::GridBase::META_FILE_MEM_BYTES, openvdb::Int64Metadata(memory_bytes));
     stock->insertMeta(openvdb::GridBase::META_FILE_VOXEL_COUNT, openvdb::Int64Metadata(statistics.voxels));
     std::ostringstream name, head;
-    vdb_io::GridDescriptor(grid.name, stock->type(), half).writeHeader(name);
+    vdb_io::GridDescriptor(grid.name, stock->type(), in_16_bits).writeHeader(name);
     const uint32_t flags = flags_of(codec);
     head.write(reinterpret_cast<const char*>(&flags), sizeof flags);
     stock->writeMeta(head);
@@ -289,8 +290,8 @@ struct VdbWriter::State {
   }
 
   template <typename Value>
-  void write(const LeafGrid& grid, const Leaves<Value>& leaves, VdbCodec codec, bool half);
-  void write(const LeafGrid& grid, const Region& region, VdbCodec codec, bool half);
+  void write(const LeafGrid& grid, const Leaves<Value>& leaves, VdbCodec codec, bool in_16_bits);
+  void write(const LeafGrid& grid, const Region& region, VdbCodec codec, bool in_16_bits);
 
   AtomicFile file;
   MapTrailer* trailer;
@@ -301,7 +302,7 @@ struct VdbWriter::State {
 };
 
 template <typename Value>
-void VdbWriter::State::write(const LeafGrid& grid, const Leaves<Value>& leaves, VdbCodec codec, bool half) {
+void VdbWriter::State::write(const LeafGrid& grid, const Leaves<Value>& leaves, VdbCodec codec, bool in_16_bits) {
   const std::vector<BlockCoord>& coords = *leaves.coords;
   std::vector<uint32_t> order(coords.size());
   for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -319,7 +320,7 @@ void VdbWriter::State::write(const LeafGrid& grid, const Leaves<Value>& leaves, 
     for (size_t i = chunk * kChunkLeaves; i < std::min(order.size(), (chunk + 1) * kChunkLeaves); ++i) {
       BlockMask& active = masks[order[i]];
       active = leaves.fill(order[i], reinterpret_cast<Value*>(mine.values.data()));
-      if (leaves.keeps_empty || active.any()) end = put_leaf(active, leaves.background, codec, half, mine, end);
+      if (leaves.keeps_empty || active.any()) end = put_leaf(active, leaves.background, codec, in_16_bits, mine, end);
     }
     return size_t(end - out.data());
   };
@@ -329,36 +330,41 @@ void VdbWriter::State::write(const LeafGrid& grid, const Leaves<Value>& leaves, 
   chunks.resize(std::max({chunks.size(), kept, std::min(count, kGroupChunks)}));
   std::vector<size_t> bytes(count);
   tbb::parallel_for(size_t(0), count, [&](size_t c) { bytes[c] = encode(c, c < kept ? &chunks[c] : nullptr); });
-  if (!leaves.keeps_empty) std::erase_if(order, [&](uint32_t i) { return !masks[i].any(); });
+  // Chunks are cut from all leaves, also those that turn out empty.
+  std::vector<uint32_t> present = order;
+  if (!leaves.keeps_empty) std::erase_if(present, [&](uint32_t i) { return !masks[i].any(); });
   Statistics statistics;
-  const std::string tree = topology(coords, order, masks, leaves.background, codec, half, statistics);
+  const std::string tree = topology(coords, present, masks, leaves.background, codec, in_16_bits, statistics);
   uint64_t value_bytes = 0;
   for (const size_t n : bytes) value_bytes += n;
   put_head(grid, tree, statistics,
            tree_bytes<typename StockGrid<Value>::type::TreeType>(statistics, kBlockVoxels * sizeof(Value)), value_bytes,
-           codec, half);
+           codec, in_16_bits);
   for (size_t c = 0; c < kept; ++c) put(chunks[c].data(), bytes[c]);
   for (size_t first = kept; first < count; first += kGroupChunks) {
     const size_t group = std::min(kGroupChunks, count - first);
-    tbb::parallel_for(size_t(0), group, [&](size_t g) { encode(first + g, &chunks[g]); });
+    tbb::parallel_for(size_t(0), group, [&](size_t g) {
+      if (encode(first + g, &chunks[g]) != bytes[first + g])
+        throw std::logic_error("grid '" + grid.name + "' has other values each time");
+    });
     for (size_t g = 0; g < group; ++g) put(chunks[g].data(), bytes[first + g]);
   }
 }
 
-void VdbWriter::State::write(const LeafGrid& grid, const Region& region, VdbCodec codec, bool half) {
+void VdbWriter::State::write(const LeafGrid& grid, const Region& region, VdbCodec codec, bool in_16_bits) {
   std::vector<uint32_t> order(region.blocks());
   for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   std::sort(order.begin(), order.end(),
             [&](uint32_t a, uint32_t b) { return before_in_tree(region.coord[a], region.coord[b]); });
   Statistics statistics;
-  const std::string tree = topology(region.coord, order, region.mask, false, codec, half, statistics);
+  const std::string tree = topology(region.coord, order, region.mask, false, codec, in_16_bits, statistics);
   std::string values;
   for (const uint32_t i : order) {
     const Index3 o = first_voxel(region.coord[i]);
     append(values, region.mask[i].word);
     append(values, std::array{o.x, o.y, o.z});
   }
-  put_head(grid, tree, statistics, tree_bytes<openvdb::MaskTree>(statistics, 0), values.size(), codec, half);
+  put_head(grid, tree, statistics, tree_bytes<openvdb::MaskTree>(statistics, 0), values.size(), codec, in_16_bits);
   put(values);
 }
 
@@ -381,8 +387,8 @@ void VdbWriter::begin(const openvdb::MetaMap& metadata, size_t grids, const std:
   state_->put(head);
 }
 
-void VdbWriter::write(const LeafGrid& grid, VdbCodec codec, bool half) {
-  std::visit([&](const auto& leaves) { state_->write(grid, leaves, codec, half); }, grid.leaves);
+void VdbWriter::write(const LeafGrid& grid, VdbCodec codec, bool in_16_bits) {
+  std::visit([&](const auto& leaves) { state_->write(grid, leaves, codec, in_16_bits); }, grid.leaves);
 }
 
 void VdbWriter::commit(const std::string& tail) {

@@ -35,8 +35,8 @@ public:
 
   /// `grids`: the number of `write` calls that follow.
   void begin(const openvdb::MetaMap& metadata, size_t grids, const std::string& seed);
-  /// Names must be distinct. `half`: floats in 16 bits.
-  void write(const LeafGrid& grid, VdbCodec codec, bool half = false);
+  /// Names must be distinct. `in_16_bits`: floats in 16 bits.
+  void write(const LeafGrid& grid, VdbCodec codec, bool in_16_bits = false);
   /// Appends bytes that OpenVDB does not read, and puts the file in its place.
   void commit(const std::string& tail = "");
 
