@@ -9,7 +9,7 @@
 #include "bench/support/bench.h"
 #include "core/simd.h"
 #include "mapping/tsdf_integrator.h"
-#include "mapping/vdb_views.h"
+#include "mapping/vdb_state.h"
 
 namespace {
 
@@ -42,9 +42,12 @@ Cost fuse_all(const std::vector<Frame>& frames, double voxel_size_m, size_t thre
     }
     cost.blocks_per_frame = double(blocks) / double(frames.size());
     cost.blocks = map.store.size();
-    if (repetition == 0)
-      cost.stock_bytes_per_voxel = double(tsdf_grid(map)->memUsage() + weight_grid(map)->memUsage()) /
-                                   double(tsdf_grid(map)->tree().leafCount() * kBlockVoxels);
+    if (repetition == 0) {
+      const BlockList observed = block_lists(map).observed;
+      cost.stock_bytes_per_voxel = double(stock_grid(tsdf_grid(map, observed))->memUsage() +
+                                          stock_grid(weight_grid(map, observed))->memUsage()) /
+                                   double(observed.blocks->size() * kBlockVoxels);
+    }
     cost.bytes_per_voxel = double(map.store.geometry_bytes()) / double(map.store.size() * kBlockVoxels);
   }
   const auto ms = [](std::vector<double> s) { return 1e3 * bench::median(std::move(s)); };
