@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "io/camera_file.h"
+#include "io/depth_decode.h"
 #include "io/image_decode.h"
 #include "io/lidar_scan.h"
 #include "io/probability_images.h"
@@ -19,6 +20,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr size_t kImageFileLimitBytes = size_t(1) << 28;
+/// No sensor sees as far; what floating-point depth holds beyond it means nothing measured.
+constexpr float kFarthestMetres = 10000;
 
 /// Thrown within `read` only: the frame becomes a SkippedFrame.
 struct Skip {
@@ -75,6 +78,8 @@ private:
   void find_camera(const fs::path& path);
   Eigen::Isometry3d read_pose(const FrameRecord& frame) const;
   DepthImage read_depth(const ImageSource& source) const;
+  template <typename Stored>
+  DepthImage metres_of(const Image<Stored>& stored, const ImageSource& source) const;
   ColorImage read_color(const ImageSource& source, const DepthImage& depth_m) const;
   Image<uint16_t> read_ids(const ImageSource& source, const std::string& kind, const DepthImage& depth_m) const;
   LabelImage read_labels(const ImageSource& source, const DepthImage& depth_m) const;
@@ -199,6 +204,28 @@ Eigen::Isometry3d ListedSequence::read_pose(const FrameRecord& frame) const {
   return camera_pose(std::get<Eigen::Isometry3d>(recorded), listing_.pose_convention, listing_.T_body_camera);
 }
 
+template <typename Stored>
+DepthImage ListedSequence::metres_of(const Image<Stored>& stored, const ImageSource& source) const {
+  if (stored.width() != info_.camera.width || stored.height() != info_.camera.height)
+    throw Skip{"wrong-size depth image",
+               describe_mismatch(source.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
+                                 size_text(stored.width(), stored.height()))};
+  DepthImage depth_m(stored.width(), stored.height());
+  const bool rotated = listing_.depth_encoding == DepthEncoding::rotated3;
+  const float scale = float(listing_.depth_scale);
+  for (size_t p = 0; p < stored.size(); ++p) {
+    Stored value = stored.data()[p];
+    if constexpr (std::is_integral_v<Stored>) {
+      if (rotated) value = Stored(value >> 3 | value << 13);
+      if (value != 0 && value != 0xffff) depth_m.data()[p] = float(value) / scale;
+    } else {
+      // Renderers write a huge number where a ray meets nothing; NaN fails both comparisons.
+      if (const float metres = value / scale; metres > 0 && metres < kFarthestMetres) depth_m.data()[p] = metres;
+    }
+  }
+  return depth_m;
+}
+
 DepthImage ListedSequence::read_depth(const ImageSource& source) const {
   if (source.codec == ImageSource::Codec::scan) {
     DepthImage depth_m = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
@@ -208,26 +235,14 @@ DepthImage ListedSequence::read_depth(const ImageSource& source) const {
       throw Skip{"depth all zero", source.path.string()};
     return depth_m;
   }
-  const Image<uint16_t> raw = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
-    if (source.codec == ImageSource::Codec::image_file) return decode_gray16(bytes, where);
-    return decode_u16_values(bytes, source.codec == ImageSource::Codec::zlib_u16, info_.camera.width,
-                             info_.camera.height, where);
+  const StoredDepth stored = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
+    if (source.codec == ImageSource::Codec::image_file) return decode_depth(bytes, where);
+    return StoredDepth(decode_u16_values(bytes, source.codec == ImageSource::Codec::zlib_u16, info_.camera.width,
+                                         info_.camera.height, where));
   });
-  if (raw.width() != info_.camera.width || raw.height() != info_.camera.height)
-    throw Skip{"wrong-size depth image",
-               describe_mismatch(source.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
-                                 size_text(raw.width(), raw.height()))};
-  DepthImage depth_m(raw.width(), raw.height());
-  const bool rotated = listing_.depth_encoding == DepthEncoding::rotated3;
-  const float scale = float(listing_.depth_scale);
-  uint32_t any = 0;
-  for (size_t p = 0; p < raw.size(); ++p) {
-    const uint16_t stored = raw.data()[p], value = rotated ? uint16_t(stored >> 3 | stored << 13) : stored;
-    const bool valid = value != 0 && value != 0xffff;
-    any |= valid;
-    depth_m.data()[p] = valid ? float(value) / scale : 0.0f;
-  }
-  if (!any) throw Skip{"depth all zero", source.path.string()};
+  DepthImage depth_m = std::visit([&](const auto& image) { return metres_of(image, source); }, stored);
+  if (std::none_of(depth_m.begin(), depth_m.end(), [](float depth) { return depth > 0; }))
+    throw Skip{"depth all zero", source.path.string()};
   if (!undistortion_.empty()) depth_m = undistorted(depth_m, undistortion_, 0.0f);
   for (size_t p = 0; p < z_per_ray_length_.size(); ++p) depth_m.data()[p] *= z_per_ray_length_.data()[p];
   return depth_m;
