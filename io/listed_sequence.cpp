@@ -84,6 +84,7 @@ private:
   Image<uint16_t> read_ids(const ImageSource& source, const std::string& kind, const DepthImage& depth_m) const;
   LabelImage read_labels(const ImageSource& source, const DepthImage& depth_m) const;
   Image<uint16_t> read_masks(const std::vector<ImageSource>& masks, const DepthImage& depth_m) const;
+  Image<uint16_t> read_probability_planes(const ImageSource& source, float& scale) const;
   ProbabilityImage read_probabilities(const ImageSource& source, const LabelImage& labels) const;
   ProbabilityImage read_class_maps(const FrameRecord& frame) const;
   PinholeCamera camera_of_color_grid(int width, int height) const;
@@ -330,14 +331,29 @@ float full_scale(std::span<const uint8_t> bytes, const std::string& where) {
   return read_image_header(bytes, where).bits > 8 ? 65535.0f : 255.0f;
 }
 
-ProbabilityImage ListedSequence::read_probabilities(const ImageSource& source, const LabelImage& labels) const {
-  const int width = info_.camera.width, height = info_.camera.height;
-  float scale = 1;
-  const Image<uint16_t> stack =
+Image<uint16_t> ListedSequence::read_probability_planes(const ImageSource& source, float& scale) const {
+  Image<uint16_t> planes =
       decoded(source, "probability", [&](std::span<const uint8_t> bytes, const std::string& where) {
         scale = full_scale(bytes, where);
         return decode_gray16(bytes, where);
       });
+  const int width = info_.camera.width, height = info_.camera.height;
+  if (undistortion_.empty() || planes.width() != width || planes.height() % height != 0) return planes;
+  // Every plane came through the depth camera's lens, as labels do; what it did not see has no probability.
+  Image<uint16_t> straight(width, planes.height());
+  for (int top = 0; top < planes.height(); top += height) {
+    uint16_t* const to = straight.row(top);
+    const uint16_t* const from = planes.row(top);
+    for (size_t p = 0; p < undistortion_.size(); ++p)
+      if (const int32_t pixel = undistortion_.data()[p]; pixel >= 0) to[p] = from[pixel];
+  }
+  return straight;
+}
+
+ProbabilityImage ListedSequence::read_probabilities(const ImageSource& source, const LabelImage& labels) const {
+  const int width = info_.camera.width, height = info_.camera.height;
+  float scale = 1;
+  const Image<uint16_t> stack = read_probability_planes(source, scale);
   if (stack.width() == width && stack.height() == height && !labels.empty())
     return probabilities_of_confidence(labels, stack, scale);
   if (stack.width() != width || stack.height() % (2 * height) != 0)
@@ -353,11 +369,7 @@ ProbabilityImage ListedSequence::read_class_maps(const FrameRecord& frame) const
   std::vector<DecodedClassMap> maps;
   for (const ClassMap& map : frame.class_maps) {
     float scale = 1;
-    Image<uint16_t> values =
-        decoded(map.image, "probability", [&](std::span<const uint8_t> bytes, const std::string& where) {
-          scale = full_scale(bytes, where);
-          return decode_gray16(bytes, where);
-        });
+    Image<uint16_t> values = read_probability_planes(map.image, scale);
     if (values.width() != info_.camera.width || values.height() != info_.camera.height)
       throw Skip{"wrong-size probability image",
                  describe_mismatch(map.image.path.string(), "size", size_text(info_.camera.width, info_.camera.height),

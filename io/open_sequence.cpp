@@ -29,13 +29,30 @@ const Layout& layout_named(const std::string& name) {
   throw ConfigError(describe_mismatch("--format", "layout", "one of " + names, "'" + name + "'"));
 }
 
+/// What lies directly in a folder, by ending: "4 files *.bag, 3 folders"; says so where they are recordings of ROS.
+std::string contents_of(const fs::path& path) {
+  if (!fs::is_directory(path)) return "a file '" + path.filename().string() + "'";
+  std::map<std::string, int> kinds;
+  std::error_code fault;
+  bool of_ros = false;
+  for (fs::directory_iterator at(path, fault), end; !fault && at != end; at.increment(fault)) {
+    const std::string ending = at->path().extension().string();
+    of_ros |= ending == ".bag" || ending == ".mcap" || ending == ".db3";
+    ++kinds[at->is_directory(fault) ? "folders" : ending.empty() ? "files without an ending" : "*" + ending];
+  }
+  std::string text;
+  for (const auto& [kind, count] : kinds) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + kind;
+  if (text.empty()) text = "an empty folder";
+  return of_ros ? text + " (ROS recordings are not read: export their images and poses first)" : text;
+}
+
 const Layout& detect_layout(const fs::path& path) {
   std::string looked_for;
   for (const Layout& layout : all_layouts()) {
     if (layout.recognises(path)) return layout;
     looked_for += std::string(looked_for.empty() ? "" : "; ") + layout.name + ": " + layout.looks_for;
   }
-  throw FormatError(describe_mismatch(path.string(), "sequence", looked_for, "none of these"));
+  throw FormatError(describe_mismatch(path.string(), "sequence", looked_for, "none of these but " + contents_of(path)));
 }
 
 SequenceListing list_as_recorded(const fs::path& path, const SequenceOptions& options) {
