@@ -12,6 +12,7 @@
 #include "io/layouts/frame_files.h"
 #include "io/text_input.h"
 #include "io/trajectory_file.h"
+#include "io/yaml_problems.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -20,9 +21,9 @@ namespace {
 bool recognises(const fs::path& path) { return fs::exists(path / "sequence.yaml"); }
 
 /// Reads `sequence.yaml`, gathering every problem.
-class Settings {
+class Settings : public YamlProblems {
 public:
-  Settings(const YAML::Node& root, const fs::path& file) : root_(root), file_(file) {}
+  Settings(const YAML::Node& root, const fs::path& file) : YamlProblems(file), root_(root) {}
 
   std::string text(const char* key, const std::string& otherwise) {
     const YAML::Node node = root_[key];
@@ -54,24 +55,9 @@ public:
             "something else");
     return {};
   }
-  void problem(const YAML::Node& node, const std::string& key, const std::string& expected, const std::string& found) {
-    problems.push_back(
-        describe_mismatch(file_.string() + ":" + std::to_string(node.Mark().line + 1), key, expected, found));
-  }
-  void refuse_unknown(const YAML::Node& node, const std::set<std::string>& known) {
-    std::string names;
-    for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
-    for (const auto& entry : node)
-      if (!entry.first.IsScalar() || !known.contains(entry.first.Scalar()))
-        problem(entry.first, "key", "one of " + names,
-                entry.first.IsScalar() ? "'" + entry.first.Scalar() + "'" : "a list");
-  }
-
-  std::vector<std::string> problems;
 
 private:
   const YAML::Node& root_;
-  const fs::path& file_;
 };
 
 void read_settings(const fs::path& file, SequenceListing& listing, std::map<std::string, std::string>& paths) {
