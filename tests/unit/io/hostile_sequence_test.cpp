@@ -115,8 +115,7 @@ TEST_CASE("texts with a byte order mark and Windows line ends read like any othe
 
 TEST_CASE("paths with blanks, quotes and letters of any script are paths like others, in every layout") {
   TemporaryDirectory folder;
-  const fs::path odd =
-      folder.path() / "die K\xc3\xbcche (2. Versuch) 'a' \"b\" \xe6\x88\xbf\xe9\x96\x93 \xf0\x9f\x8f\xa0 %d #1";
+  const fs::path odd = folder.path() / "die K\u00fcche (2. Versuch) 'a' \"b\" \u623f\u9593 \U0001f3e0 %d #1";
   struct Layout {
     const char* name;
     void (*write)(const fs::path&, int);
@@ -132,13 +131,13 @@ TEST_CASE("paths with blanks, quotes and letters of any script are paths like ot
     CHECK(std::holds_alternative<Frame>(reader->read(1)));
   }
   // Names with blanks within a list, and folders that the description names.
-  fs::rename(odd / "tum" / "depth", odd / "tum" / "depth of the \xc3\xbc kitchen");
-  write_text(odd / "tum" / "depth.txt", "100.000000 depth of the \xc3\xbc kitchen/100.000000.png\n");
+  fs::rename(odd / "tum" / "depth", odd / "tum" / "depth of the \u00fc kitchen");
+  write_text(odd / "tum" / "depth.txt", "100.000000 depth of the \u00fc kitchen/100.000000.png\n");
   CHECK(std::holds_alternative<Frame>(open_sequence(odd / "tum")->read(0)));
-  fs::rename(odd / "generic" / "depth", odd / "generic" / "Tiefe \xc3\xa4");
+  fs::rename(odd / "generic" / "depth", odd / "generic" / "Tiefe \u00e4");
   write_text(odd / "generic" / "sequence.yaml",
              "camera: {fx: 20, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16}\ndepth_scale: 2000\n"
-             "paths: {depth: \"Tiefe \xc3\xa4\"}\n");
+             "paths: {depth: \"Tiefe \u00e4\"}\n");
   CHECK(std::holds_alternative<Frame>(open_sequence(odd / "generic")->read(0)));
 }
 
