@@ -127,6 +127,30 @@ TEST_CASE("surfaces are not seen from behind, nor where a voxel was not observed
   CHECK(RayCaster(map).cast({0.101, 0.001, 0}, {0, 0, 1}, 0, 10).has_value());
 }
 
+TEST_CASE("a picture shows at every pixel what a ray by itself meets, wherever the camera stands") {
+  const Map map = room();
+  const RayCaster caster(map);
+  const ViewOptions options{.min_depth_m = 0.05, .max_depth_m = 1.2};
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> any(-1, 1);
+  int met = 0, none = 0;
+  for (int view = 0; view < 30; ++view) {
+    // Within the room, within the band of its walls, outside, and so that blocks lie on both sides of the camera.
+    const Vector3d from = Vector3d(any(random), any(random), any(random)).cwiseProduct(Vector3d(0.75, 0.65, 0.55));
+    const Isometry3d T = looking(from, from + Vector3d(any(random), any(random), any(random)));
+    const RenderedView picture = caster.render(kCamera, T, options);
+    for (int v = 0; v < 80; ++v)
+      for (int u = 0; u < 100; ++u) {
+        const auto depth = caster.cast(from, T.linear() * kCamera.ray(u, v), options.min_depth_m, options.max_depth_m);
+        INFO("view " << view << ", pixel " << u << ' ' << v);
+        REQUIRE(double(picture.depth_m(u, v)) == Approx(depth.value_or(0)).margin(1e-5));
+        depth ? ++met : ++none;
+      }
+  }
+  CHECK(met > 50000);
+  CHECK(none > 10000);
+}
+
 TEST_CASE("the picture has the same bytes for any number of threads") {
   const Map map = room();
   const Isometry3d T = looking({-0.4, -0.35, 0.3}, {0.2, 0.1, -0.2});
