@@ -9,6 +9,14 @@ using Eigen::Vector3f;
 
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
+bool knows_class(const Block& block, int offset) {
+  for (const EvidencePlane& e : block.evidence)
+    if (e.counts->value[offset] > 0) return true;
+  for (const TouchPlanes& t : block.touch)
+    if (t.n->value[offset] > 0) return true;
+  return false;
+}
+
 }  // namespace
 
 MapSampler::Corners MapSampler::corners(const Index3& base) {
@@ -119,6 +127,25 @@ Rgba8 MapSampler::color(const Vector3d& p) {
 VoxelRef MapSampler::nearest(const Vector3d& p) {
   const Index3 v = floor_index(p + Vector3d::Constant(0.5));
   return {find(block_of_voxel(v)), uint16_t(offset_in_block(v))};
+}
+
+VoxelRef MapSampler::nearest_labelled(const Vector3d& p) {
+  const VoxelRef nearest_one = nearest(p);
+  if (nearest_one.block != BlockIndex::kNone && knows_class(store_[nearest_one.block], nearest_one.offset))
+    return nearest_one;
+  const Index3 base = floor_index(p);
+  const Neighbourhood& n = around(block_of_voxel(base));
+  const Corners corner = corners(base);
+  VoxelRef best = nearest_one;
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t c = 0; c < 8; ++c) {
+    const uint32_t block = n.block[corner.block[c]];
+    if (block == BlockIndex::kNone || !knows_class(store_[block], corner.offset[c])) continue;
+    const Vector3d at(base.x + int(c >> 2), base.y + int(c >> 1 & 1), base.z + int(c & 1));
+    const double distance = (p - at).squaredNorm();
+    if (distance < least) least = distance, best = {block, corner.offset[c]};
+  }
+  return best;
 }
 
 }  // namespace felt

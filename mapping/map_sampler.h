@@ -59,6 +59,9 @@ public:
   /// Colour between the voxels around a point that have one; a = 0 where none has.
   Rgba8 color(const Eigen::Vector3d& p);
   VoxelRef nearest(const Eigen::Vector3d& p);
+  /// The nearest of the eight voxels around a point that knows of a class, by vision or touch; the nearest where none
+  /// does: one frame's noise can leave the nearest out of the band that takes labels.
+  VoxelRef nearest_labelled(const Eigen::Vector3d& p);
 
   const BlockIndex& index() const { return index_; }
 

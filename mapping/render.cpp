@@ -222,7 +222,7 @@ RenderedView RayCaster::render(const PinholeCamera& camera, const Eigen::Isometr
         if (std::isnan(t)) continue;
         const Vector3d p = ray.at(t);
         view.depth_m(u, v) = float(t / voxels_per_depth);
-        view.voxel(u, v) = sampler.nearest(p);
+        view.voxel(u, v) = map_.classes.empty() ? sampler.nearest(p) : sampler.nearest_labelled(p);
         if (options.normals) view.normal(u, v) = sampler.normal(p);
         if (options.color) view.color(u, v) = sampler.color(p);
       }
