@@ -52,6 +52,7 @@ BlockIndex::BlockIndex(const BlockStore& store, float min_weight) {
     const BlockCoord& c = store[i].coord;
     children_[groups_.at(block_of_voxel(c))].crossing[size_t(offset_in_block(c))] = uint32_t(masks_.size());
     masks_.push_back(masks[i]);
+    crossed_.push_back(c);
   }
 }
 

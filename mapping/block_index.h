@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -44,6 +45,8 @@ public:
   }
   /// Cells whose corners were all observed and lie on both sides of the surface, by offset of their first voxel.
   const BlockMask& mask(uint32_t crossing) const { return masks_[crossing]; }
+  /// Blocks that have such cells, in the order of their masks.
+  std::span<const BlockCoord> crossed() const { return crossed_; }
 
   /// Box of all blocks; low > high where there is none.
   const BlockCoord& low() const { return low_; }
@@ -59,6 +62,7 @@ private:
   std::vector<uint32_t> dense_;  ///< groups of the whole box, where it is not too large
   std::vector<Group> children_;
   std::vector<BlockMask> masks_;
+  std::vector<BlockCoord> crossed_;
 };
 
 }  // namespace felt

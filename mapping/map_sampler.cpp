@@ -9,32 +9,46 @@ using Eigen::Vector3f;
 
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
+bool knows_class(const Block& block, int offset) {
+  for (const EvidencePlane& e : block.evidence)
+    if (e.counts->value[offset] > 0) return true;
+  for (const TouchPlanes& t : block.touch)
+    if (t.n->value[offset] > 0) return true;
+  return false;
+}
+
 }  // namespace
 
-bool MapSampler::corners(const Index3& base, std::array<VoxelRef, 8>& out) {
+MapSampler::Corners MapSampler::corners(const Index3& base) {
   const int x = base.x & 7, y = base.y & 7, z = base.z & 7;
-  // Axes along which the cell reaches into the next block: only those corners need blocks of their own.
+  // Axes along which the cell reaches into the next block.
   const int across = int(x == 7) << 2 | int(y == 7) << 1 | int(z == 7);
-  const BlockCoord low = block_of_voxel(base);
-  uint32_t block[8];
+  Corners corners;
   for (int c = 0; c < 8; ++c) {
-    const int moved = c & across;
-    if (moved == c) block[c] = find({low.x + (c >> 2), low.y + (c >> 1 & 1), low.z + (c & 1)});
-    if (block[moved] == BlockIndex::kNone) return false;
-    out[size_t(c)] = {block[moved],
-                      uint16_t(voxel_offset((x + (c >> 2)) & 7, (y + (c >> 1 & 1)) & 7, (z + (c & 1)) & 7))};
+    corners.block[size_t(c)] = uint8_t(c & across);
+    corners.offset[size_t(c)] = uint16_t(voxel_offset((x + (c >> 2)) & 7, (y + (c >> 1 & 1)) & 7, (z + (c & 1)) & 7));
   }
-  return true;
+  return corners;
+}
+
+void MapSampler::look_around(const BlockCoord& block, Neighbourhood& n) {
+  n.known = true;
+  n.coord = block;
+  for (int c = 0; c < 8; ++c) {
+    const uint32_t found = find({block.x + (c >> 2), block.y + (c >> 1 & 1), block.z + (c & 1)});
+    n.block[size_t(c)] = found;
+    n.geometry[size_t(c)] = found == BlockIndex::kNone ? nullptr : store_[found].geometry;
+  }
 }
 
 bool MapSampler::distances(const Index3& base, float (&d)[8]) {
+  const Neighbourhood& n = around(block_of_voxel(base));
   bool observed = true;
   if ((base.x & 7) < 7 && (base.y & 7) < 7 && (base.z & 7) < 7) {
     // Two of three cells lie within one block.
-    const uint32_t block = find(block_of_voxel(base));
-    if (block == BlockIndex::kNone) return false;
-    const float* tsdf = store_[block].geometry->tsdf + offset_in_block(base);
-    const float* weight = store_[block].geometry->weight + offset_in_block(base);
+    if (n.geometry[0] == nullptr) return false;
+    const float* tsdf = n.geometry[0]->tsdf + offset_in_block(base);
+    const float* weight = n.geometry[0]->weight + offset_in_block(base);
     for (int c = 0; c < 8; ++c) {
       const int v = voxel_offset(c >> 2, c >> 1 & 1, c & 1);
       observed &= weight[v] >= min_weight_;
@@ -42,14 +56,25 @@ bool MapSampler::distances(const Index3& base, float (&d)[8]) {
     }
     return observed;
   }
-  std::array<VoxelRef, 8> voxel;
-  if (!corners(base, voxel)) return false;
+  const Corners corner = corners(base);
   for (size_t c = 0; c < 8; ++c) {
-    const GeometryPlanes& planes = *store_[voxel[c].block].geometry;
-    observed &= planes.weight[voxel[c].offset] >= min_weight_;
-    d[c] = planes.tsdf[voxel[c].offset] * per_voxel_;
+    const GeometryPlanes* planes = n.geometry[corner.block[c]];
+    if (planes == nullptr) return false;
+    observed &= planes->weight[corner.offset[c]] >= min_weight_;
+    d[c] = planes->tsdf[corner.offset[c]] * per_voxel_;
   }
   return observed;
+}
+
+void MapSampler::crossed_distances(const Index3& base, float (&d)[8]) {
+  const Neighbourhood& n = around(block_of_voxel(base));
+  if ((base.x & 7) < 7 && (base.y & 7) < 7 && (base.z & 7) < 7) {
+    const float* tsdf = n.geometry[0]->tsdf + offset_in_block(base);
+    for (int c = 0; c < 8; ++c) d[c] = tsdf[voxel_offset(c >> 2, c >> 1 & 1, c & 1)] * per_voxel_;
+    return;
+  }
+  const Corners corner = corners(base);
+  for (size_t c = 0; c < 8; ++c) d[c] = n.geometry[corner.block[c]]->tsdf[corner.offset[c]] * per_voxel_;
 }
 
 float MapSampler::distance(const Vector3d& p) {
@@ -79,27 +104,48 @@ Vector3f MapSampler::normal(const Vector3d& p) {
 
 Rgba8 MapSampler::color(const Vector3d& p) {
   const Index3 base = floor_index(p);
-  std::array<VoxelRef, 8> voxel;
-  if (!corners(base, voxel)) return {0, 0, 0, 0};
+  const Neighbourhood& n = around(block_of_voxel(base));
+  const Corners corner = corners(base);
   const float x = float(p.x() - base.x), y = float(p.y() - base.y), z = float(p.z() - base.z);
-  Vector3f sum = Vector3f::Zero();
-  float total = 0;
-  for (int i = 0; i < 8; ++i) {
-    const ColorPlanes* planes = store_[voxel[size_t(i)].block].color;
-    const int v = voxel[size_t(i)].offset;
+  float r = 0, g = 0, b = 0, total = 0;
+  for (int c = 0; c < 8; ++c) {
+    const uint32_t block = n.block[corner.block[size_t(c)]];
+    if (block == BlockIndex::kNone) return {0, 0, 0, 0};
+    const ColorPlanes* planes = store_[block].color;
+    const int v = corner.offset[size_t(c)];
     if (planes == nullptr || planes->count[v] == 0) continue;
-    const float w = (i >> 2 ? x : 1 - x) * (i >> 1 & 1 ? y : 1 - y) * (i & 1 ? z : 1 - z);
-    sum += w * Vector3f(planes->r[v], planes->g[v], planes->b[v]);
+    const float w = (c >> 2 ? x : 1 - x) * (c >> 1 & 1 ? y : 1 - y) * (c & 1 ? z : 1 - z);
+    r += w * planes->r[v], g += w * planes->g[v], b += w * planes->b[v];
     total += w;
   }
   if (!(total > 0)) return {0, 0, 0, 0};
-  sum = (sum / (256 * total) + Vector3f::Constant(0.5f)).cwiseMin(255.0f);
-  return {uint8_t(sum.x()), uint8_t(sum.y()), uint8_t(sum.z()), 255};
+  const float scale = 1 / (256 * total);
+  const auto grey = [scale](float sum) { return uint8_t(std::min(sum * scale + 0.5f, 255.0f)); };
+  return {grey(r), grey(g), grey(b), 255};
 }
 
 VoxelRef MapSampler::nearest(const Vector3d& p) {
   const Index3 v = floor_index(p + Vector3d::Constant(0.5));
   return {find(block_of_voxel(v)), uint16_t(offset_in_block(v))};
+}
+
+VoxelRef MapSampler::nearest_labelled(const Vector3d& p) {
+  const VoxelRef nearest_one = nearest(p);
+  if (nearest_one.block != BlockIndex::kNone && knows_class(store_[nearest_one.block], nearest_one.offset))
+    return nearest_one;
+  const Index3 base = floor_index(p);
+  const Neighbourhood& n = around(block_of_voxel(base));
+  const Corners corner = corners(base);
+  VoxelRef best = nearest_one;
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t c = 0; c < 8; ++c) {
+    const uint32_t block = n.block[corner.block[c]];
+    if (block == BlockIndex::kNone || !knows_class(store_[block], corner.offset[c])) continue;
+    const Vector3d at(base.x + int(c >> 2), base.y + int(c >> 1 & 1), base.z + int(c & 1));
+    const double distance = (p - at).squaredNorm();
+    if (distance < least) least = distance, best = {block, corner.offset[c]};
+  }
+  return best;
 }
 
 }  // namespace felt

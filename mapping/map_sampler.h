@@ -27,8 +27,8 @@ T trilinear(const T (&d)[8], T x, T y, T z) {
   return d0 + x * (d1 - d0);
 }
 
-/// Reads a map at real voxel coordinates through its BlockIndex, remembering the group of blocks it last looked at.
-/// One a task.
+/// Reads a map at real voxel coordinates through its BlockIndex, remembering the group of blocks it last looked at and
+/// the blocks around the cells that it read. One a task.
 class MapSampler {
 public:
   MapSampler(const Map& map, const BlockIndex& index, float min_weight)
@@ -47,10 +47,10 @@ public:
     return g == nullptr ? BlockIndex::kNone : g->block[size_t(offset_in_block(block))];
   }
 
-  /// The eight voxels around a cell. False where one is in no block.
-  bool corners(const Index3& base, std::array<VoxelRef, 8>& out);
   /// Signed distances of a cell's corners in voxels; false where one was not observed.
   bool distances(const Index3& base, float (&d)[8]);
+  /// The same of a cell that the index has in a mask: its corners are known to be observed.
+  void crossed_distances(const Index3& base, float (&d)[8]);
   /// Trilinear signed distance in voxels, NaN where one of the eight voxels was not observed.
   float distance(const Eigen::Vector3d& p);
   /// Unit gradient of the trilinear distance, zero where there is none: from the four corners of a tetrahedron around
@@ -59,16 +59,40 @@ public:
   /// Colour between the voxels around a point that have one; a = 0 where none has.
   Rgba8 color(const Eigen::Vector3d& p);
   VoxelRef nearest(const Eigen::Vector3d& p);
+  /// The nearest of the eight voxels around a point that knows of a class, by vision or touch; the nearest where none
+  /// does: one frame's noise can leave the nearest out of the band that takes labels.
+  VoxelRef nearest_labelled(const Eigen::Vector3d& p);
 
   const BlockIndex& index() const { return index_; }
 
 private:
+  /// The blocks that the cells of one block reach into.
+  struct Neighbourhood {
+    bool known = false;
+    BlockCoord coord;                                ///< of the block of the cells' first corners
+    std::array<uint32_t, 8> block;                   ///< that block moved by (c >> 2, c >> 1 & 1, c & 1), or kNone
+    std::array<const GeometryPlanes*, 8> geometry;  ///< theirs, or null
+  };
+  /// The eight voxels around a cell.
+  struct Corners {
+    std::array<uint8_t, 8> block;    ///< in the neighbourhood
+    std::array<uint16_t, 8> offset;  ///< in that block
+  };
+  static Corners corners(const Index3& base);
+  const Neighbourhood& around(const BlockCoord& block) {
+    Neighbourhood& n = seen_[size_t((block.x & 1) << 2 | (block.y & 1) << 1 | (block.z & 1))];
+    if (!n.known || n.coord != block) look_around(block, n);
+    return n;
+  }
+  void look_around(const BlockCoord& block, Neighbourhood& n);
+
   const BlockIndex& index_;
   const BlockStore& store_;
   float min_weight_, per_voxel_;
   const BlockIndex::Group* group_ = nullptr;
   Index3 group_coord_;
   bool known_ = false;
+  std::array<Neighbourhood, 8> seen_;  ///< by parity of the coordinates: those around a place do not meet
 };
 
 }  // namespace felt

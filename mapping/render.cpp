@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "mapping/map_sampler.h"
+#include "mapping/surface_ranges.h"
 
 namespace felt {
 namespace {
@@ -74,10 +75,10 @@ double refine(double t_front, double d_front, double t_behind, double d_behind, 
   return (t_front * d_behind - t_behind * d_front) / (d_behind - d_front);
 }
 
-/// Crossing from front to back within a cell that the ray is in from t to t_end, or NaN.
+/// Crossing from front to back within a crossed cell that the ray is in from t to t_end, or NaN.
 double cross_cell(MapSampler& sampler, const Ray& ray, const Index3& base, double t, double t_end) {
   float corner[8];
-  if (!sampler.distances(base, corner)) return kNothing;
+  sampler.crossed_distances(base, corner);
   double d[8];
   std::copy(std::begin(corner), std::end(corner), d);
   const Vector3d origin = ray.origin - Vector3d(base.x, base.y, base.z);
@@ -205,20 +206,23 @@ RenderedView RayCaster::render(const PinholeCamera& camera, const Eigen::Isometr
   if (options.color) view.color = ColorImage(camera.width, camera.height, {0, 0, 0, 0});
   const Vector3d origin = T_world_camera.translation() / map_.voxel_size_m;
   const Eigen::Matrix3d rotation = T_world_camera.linear();
-  constexpr int kTile = 16;
+  const SurfaceRanges ranges(index_, map_.voxel_size_m, camera, T_world_camera,
+                             {options.min_depth_m, options.max_depth_m});
+  constexpr int kTile = 2 * SurfaceRanges::kTile;
   tbb::parallel_for(tbb::blocked_range2d<int>(0, camera.height, kTile, 0, camera.width, kTile), [&](const auto& tile) {
     MapSampler sampler(map_, index_, min_weight_);
     for (int v = tile.rows().begin(); v < tile.rows().end(); ++v)
       for (int u = tile.cols().begin(); u < tile.cols().end(); ++u) {
+        const auto [nearest_m, farthest_m] = ranges.at(u, v);
+        if (!(nearest_m < farthest_m)) continue;
         const Vector3d along = camera.ray(u, v);
         const double length = along.norm(), voxels_per_depth = length / map_.voxel_size_m;
         const Ray ray(origin, rotation * (along / length));
-        const double t =
-            march(sampler, ray, options.min_depth_m * voxels_per_depth, options.max_depth_m * voxels_per_depth);
+        const double t = march(sampler, ray, nearest_m * voxels_per_depth, farthest_m * voxels_per_depth);
         if (std::isnan(t)) continue;
         const Vector3d p = ray.at(t);
         view.depth_m(u, v) = float(t / voxels_per_depth);
-        view.voxel(u, v) = sampler.nearest(p);
+        view.voxel(u, v) = map_.classes.empty() ? sampler.nearest(p) : sampler.nearest_labelled(p);
         if (options.normals) view.normal(u, v) = sampler.normal(p);
         if (options.color) view.color(u, v) = sampler.color(p);
       }

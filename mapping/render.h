@@ -29,7 +29,7 @@ struct RenderedView {
   DepthImage depth_m;             ///< along the optical axis, 0 where the ray met nothing
   Image<Eigen::Vector3f> normal;  ///< unit, world frame; zero where there is none. Empty unless asked for
   ColorImage color;               ///< a = 0 where there is none. Empty unless asked for
-  Image<VoxelRef> voxel;          ///< the voxel nearest to the surface point
+  Image<VoxelRef> voxel;          ///< nearest to the surface point; of those around it that know of a class, if any
 };
 
 /// Ray casting through the blocks of a map, which must outlive the caster and not change meanwhile.

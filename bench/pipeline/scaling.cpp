@@ -1,5 +1,6 @@
 // How the cost of a frame and the size of the map grow with voxel size, resolution, number of frames, number of classes
-// and threads: tables, and one picture of the curves.
+// and threads: tables, and one picture of the curves. Voxels are those of the blocks in view (cost) and of the blocks of
+// the map (bytes).
 //   bench_scaling [picture.svg]
 #include <tbb/global_control.h>
 
@@ -16,15 +17,16 @@ namespace {
 using namespace felt;
 
 struct Cost {
-  double ms = 0;         ///< median over frames of the best of the rounds
-  double megabytes = 0;  ///< of the map
-  size_t blocks = 0;
+  double ms = 0;            ///< of a frame: median over frames of the best of the rounds
+  double ns_per_voxel = 0;  ///< likewise
+  double megabytes = 0;     ///< of the map
+  double bytes_per_voxel = 0;
 };
 
 Cost fuse(const std::vector<Frame>& frames, double voxel_m, size_t threads, const ClassTable& classes = {}) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   constexpr int kRounds = 3;
-  std::vector<double> best(frames.size(), 1e9);
+  std::vector<double> best(frames.size(), 1e9), per_voxel(frames.size());
   Cost cost;
   for (int round = 0; round < kRounds; ++round) {
     Map map(voxel_m, 4 * voxel_m);
@@ -33,11 +35,14 @@ Cost fuse(const std::vector<Frame>& frames, double voxel_m, size_t threads, cons
     for (size_t n = 0; n < frames.size(); ++n) {
       const FrameStats stats = integrate(map, frames[n], {}, scratch);
       best[n] = std::min(best[n], stats.allocate_s + stats.fuse_s);
+      per_voxel[n] = best[n] / double(std::max<size_t>(1, stats.blocks_in_view) * kBlockVoxels);
     }
-    cost.megabytes = 1e-6 * double(map.store.geometry_bytes() + map.store.plane_bytes());
-    cost.blocks = map.store.size();
+    const auto bytes = double(map.store.geometry_bytes() + map.store.plane_bytes());
+    cost.megabytes = 1e-6 * bytes;
+    cost.bytes_per_voxel = bytes / double(map.store.size() * kBlockVoxels);
   }
   cost.ms = 1e3 * bench::median(best);
+  cost.ns_per_voxel = 1e9 * bench::median(per_voxel);
   return cost;
 }
 
@@ -107,45 +112,53 @@ int main(int argc, char** argv) {
               simd_name().c_str());
   std::vector<Plot> plots;
 
-  std::printf("\n| voxel, cm | threads | ms a frame | blocks | map, MB |\n|---|---|---|---|---|\n");
+  std::printf("\n| voxel, cm | threads | ms a frame | ns a voxel | map, MB | bytes a voxel |\n|---|---|---|---|---|---|\n");
   Curve by_voxel("Voxel size", "voxel, cm", "ms a frame", true);
   for (const double cm : {5.0, 3.0, 2.0, 1.5, 1.0})
     for (const size_t threads : {1, 2}) {
       const Cost c = fuse(plain, cm / 100, threads);
-      std::printf("| %g | %zu | %.3f | %zu | %.1f |\n", cm, threads, c.ms, c.blocks, c.megabytes);
+      std::printf("| %g | %zu | %.3f | %.2f | %.1f | %.2f |\n", cm, threads, c.ms, c.ns_per_voxel, c.megabytes,
+                  c.bytes_per_voxel);
       by_voxel.add(threads == 1 ? "1 thread" : "2 threads", cm, c.ms);
     }
   plots.push_back(by_voxel.plot);
 
-  std::printf("\n| image, 2 cm voxels | ms a frame |\n|---|---|\n");
+  std::printf("\n| image, 2 cm voxels | ms a frame | ns a voxel | ns a pixel |\n|---|---|---|---|\n");
   Curve by_pixels("Resolution", "pixels", "ms a frame", true);
   for (const int width : {160, 320, 640, 1280}) {
     const Cost c = fuse(without_labels(room(width > 640 ? 8 : 15, width, width * 3 / 4)), 0.02, 1);
-    std::printf("| %dx%d | %.3f |\n", width, width * 3 / 4, c.ms);
+    std::printf("| %dx%d | %.3f | %.2f | %.2f |\n", width, width * 3 / 4, c.ms, c.ns_per_voxel,
+                1e6 * c.ms / (width * width * 0.75));
     by_pixels.add("1 thread", width * width * 0.75, c.ms);
   }
   plots.push_back(by_pixels.plot);
 
-  std::printf("\n| frames of the same path, 2 cm voxels | ms a frame | map, MB |\n|---|---|---|\n");
+  std::printf("\n| frames of the same path, 2 cm voxels | ms a frame | ns a voxel | map, MB | bytes a voxel |\n|---|---|---|---|---|\n");
   Curve by_frames("Frames", "frames", "ms a frame, map MB", true);
   for (const int n : {10, 20, 40, 80, 160}) {
     const Cost c = fuse(without_labels(room(n, 320, 240)), 0.02, 1);
-    std::printf("| %d of 320x240 | %.3f | %.1f |\n", n, c.ms, c.megabytes);
+    std::printf("| %d of 320x240 | %.3f | %.2f | %.1f | %.2f |\n", n, c.ms, c.ns_per_voxel, c.megabytes,
+                c.bytes_per_voxel);
     by_frames.add("ms a frame", n, c.ms);
     by_frames.add("map, MB", n, c.megabytes);
   }
   plots.push_back(by_frames.plot);
 
   std::printf(
-      "\n| classes, 2 cm voxels | ms a frame, labels | map, MB | ms a frame, top 3 probabilities | map, MB |\n"
-      "|---|---|---|---|---|\n");
+      "\n| classes, 2 cm voxels | evidence | ms a frame | ns a voxel | map, MB | bytes a voxel |\n"
+      "|---|---|---|---|---|---|\n");
   Curve by_classes("Classes", "classes", "ms a frame", true);
-  const Cost none = fuse(plain, 0.02, 1);
-  std::printf("| 0 | %.3f | %.1f | | |\n", none.ms, none.megabytes);
+  const auto class_row = [](int k, const char* evidence, const Cost& c) {
+    std::printf("| %d | %s | %.3f | %.2f | %.1f | %.2f |\n", k, evidence, c.ms, c.ns_per_voxel, c.megabytes,
+                c.bytes_per_voxel);
+    std::fflush(stdout);
+  };
+  class_row(0, "-", fuse(plain, 0.02, 1));
   for (const int k : {3, 8, 40, 150}) {
     const Cost hard = fuse(labelled(frames, k, 0), 0.02, 1, table_of(k));
+    class_row(k, "labels", hard);
     const Cost soft = fuse(labelled(frames, k, 3), 0.02, 1, table_of(k));
-    std::printf("| %d | %.3f | %.1f | %.3f | %.1f |\n", k, hard.ms, hard.megabytes, soft.ms, soft.megabytes);
+    class_row(k, "top 3 probabilities", soft);
     by_classes.add("labels", k, hard.ms);
     by_classes.add("top 3 probabilities", k, soft.ms);
   }

@@ -22,12 +22,12 @@ double room_distance(const Vector3d& p) {
   return std::min((Vector3d(0.7, 0.6, 0.5) - p.cwiseAbs()).minCoeff(), (p - Vector3d(0.2, 0.1, -0.2)).norm() - 0.2);
 }
 
-Map room() {
+Map room(const Vector3d& shift_m = Vector3d::Zero()) {
   Map map(0.02, 0.08);
   for (int x = -38; x <= 38; ++x)
     for (int y = -33; y <= 33; ++y)
       for (int z = -28; z <= 28; ++z) {
-        const double d = room_distance(Vector3d(x, y, z) * 0.02);
+        const double d = room_distance(Vector3d(x, y, z) * 0.02 - shift_m);
         if (std::abs(d) < 0.08) test::set_voxel(map, {x, y, z}, float(d));
       }
   return map;
@@ -111,6 +111,34 @@ TEST_CASE("depth, normal and colour agree with the scene, and the voxel is the n
   CHECK((view.normal(50, 40).cast<double>() + to_ball).norm() < 0.05);
 }
 
+TEST_CASE("where the nearest voxel has no class, the pixel is that of the nearest one around it that has") {
+  Map map(0.02, 0.08);
+  map.classes = ClassTable({{1, "wall", {}, false}});
+  test::fill_map(map, {-30, -30, 40}, {30, 30, 60}, [](const Vector3d& p) { return 1.006 - p.z(); });
+  // Beside the optical axis the surface is at (0.2, 0.2, 50.3) voxels: nearest is (0, 0, 50), then (1, 0, 50) and so on.
+  const auto label = [&map](const Index3& v) {
+    Block& block = map.store[map.store.find(block_of_voxel(v))];
+    if (block.evidence.empty()) block.evidence = {{0, map.store.new_plane()}};
+    block.evidence[0].counts->value[offset_in_block(v)] = 1;
+  };
+  const Isometry3d T(Eigen::Translation3d(0.004, 0.004, 0));
+  const PinholeCamera camera{100, 100, 0, 0, 1, 1};
+  const auto seen = [&] {
+    const VoxelRef v = RayCaster(map).render(camera, T).voxel(0, 0);
+    const Index3 first = first_voxel(map.store[v.block].coord), local = voxel_of_offset(v.offset);
+    return Index3{first.x + local.x, first.y + local.y, first.z + local.z};
+  };
+  CHECK(seen() == Index3{0, 0, 50});
+  label({2, 0, 50});  // not around the point
+  CHECK(seen() == Index3{0, 0, 50});
+  label({1, 0, 51});
+  CHECK(seen() == Index3{1, 0, 51});
+  label({0, 0, 51});
+  CHECK(seen() == Index3{0, 0, 51});
+  label({0, 0, 50});
+  CHECK(seen() == Index3{0, 0, 50});
+}
+
 TEST_CASE("surfaces are not seen from behind, nor where a voxel was not observed, nor beyond the depth limits") {
   Map map(0.02, 0.08);
   test::fill_map(map, {-30, -30, 40}, {30, 30, 60}, [](const Vector3d& p) { return 1.0 - p.z(); });
@@ -125,6 +153,31 @@ TEST_CASE("surfaces are not seen from behind, nor where a voxel was not observed
   test::set_voxel(map, {0, 0, 50}, 0, 0);
   CHECK_FALSE(RayCaster(map).cast({0.001, 0.001, 0}, {0, 0, 1}, 0, 10).has_value());
   CHECK(RayCaster(map).cast({0.101, 0.001, 0}, {0, 0, 1}, 0, 10).has_value());
+}
+
+TEST_CASE("a picture shows at every pixel what a ray by itself meets, wherever the camera stands") {
+  // Not in the plane of voxels, where a ray along the seam of two walls meets them or not by rounding.
+  const Map map = room({0.003, 0.007, -0.004});
+  const RayCaster caster(map);
+  const ViewOptions options{.min_depth_m = 0.05, .max_depth_m = 1.2};
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> any(-1, 1);
+  int met = 0, none = 0;
+  for (int view = 0; view < 8; ++view) {
+    // Within the room, within the band of its walls, outside, and so that blocks lie on both sides of the camera.
+    const Vector3d from = Vector3d(any(random), any(random), any(random)).cwiseProduct(Vector3d(0.75, 0.65, 0.55));
+    const Isometry3d T = looking(from, from + Vector3d(any(random), any(random), any(random)));
+    const RenderedView picture = caster.render(kCamera, T, options);
+    for (int v = 0; v < 80; ++v)
+      for (int u = 0; u < 100; ++u) {
+        const auto depth = caster.cast(from, T.linear() * kCamera.ray(u, v), options.min_depth_m, options.max_depth_m);
+        INFO("view " << view << ", pixel " << u << ' ' << v);
+        REQUIRE(double(picture.depth_m(u, v)) == Approx(depth.value_or(0)).margin(1e-5));
+        depth ? ++met : ++none;
+      }
+  }
+  CHECK(met > 10000);
+  CHECK(none > 1000);
 }
 
 TEST_CASE("the picture has the same bytes for any number of threads") {
