@@ -30,11 +30,29 @@ struct Planes {
   alignas(64) float outside[kSide * kSide * kRow];  ///< 0 in the band, else kAgrees
 };
 
-/// Calls `visit(first)` for vectors that cover z = -1 .. 8 of the row at `row`; some overlap.
+/// Places along a row, from its first on, that lie within a voxel of a candidate: often one vector covers them.
+struct Extent {
+  int begin, end;
+};
+
+Extent extent_along_rows(const std::array<uint64_t, 8>& candidate) {
+  uint64_t any = 0;
+  for (const uint64_t word : candidate) any |= word;
+  any |= any >> 32;
+  any |= any >> 16;
+  any |= any >> 8;
+  const unsigned z = unsigned(any & 0xff);
+  return {kFirstZ + __builtin_ctz(z) - 1, kFirstZ + 31 - __builtin_clz(z) + 2};
+}
+
+/// Calls `visit(first)` for vectors that cover the extent of the row at `row`: some overlap, all stay within z = -1 .. 8.
 template <typename Visit>
-HWY_INLINE void along_row(int row, const Visit& visit) {
-  const int lanes = int(hn::Lanes(kF)), begin = kFirstZ - 1, end = kFirstZ + 9;
-  for (int z = begin; z < end; z += lanes) visit(row + std::min(z, end - lanes));
+HWY_INLINE void along_row(int row, const Extent& extent, const Visit& visit) {
+  const int lanes = int(hn::Lanes(kF)), last = std::max(extent.end - lanes, kFirstZ - 1);
+  for (int z = std::min(extent.begin, last);; z += lanes) {
+    visit(row + std::min(z, last));
+    if (z >= last) return;
+  }
 }
 
 /// Calls `visit(row, x, y)` for rows named by `rows`, x and y from -2 on.
@@ -93,7 +111,7 @@ HWY_INLINE void measure_normals(const SurfaceTile& tile, const FloatVec band, in
 /// Whether all normals lie so near to one direction that each two of them agree, with room for rounding. Any direction
 /// would do: their sum decides nothing but how often this holds.
 HWY_INLINE bool within_a_cone(const Planes& p, const FloatVec sum[3], const std::array<uint16_t, kSide>& rows,
-                            float cos_limit) {
+                              const Extent& extent, float cos_limit) {
   float axis[3];
   for (int c = 0; c < 3; ++c) axis[c] = hn::GetLane(hn::SumOfLanes(kF, sum[c]));
   const float length = std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
@@ -103,7 +121,7 @@ HWY_INLINE bool within_a_cone(const Planes& p, const FloatVec sum[3], const std:
   const FloatVec least = hn::Set(kF, std::sqrt(0.5f * (1 + cos_limit)) + 1e-4f);
   FloatMask all = hn::Eq(x, x);
   for_each_row(rows, [&](int row, int, int) HWY_ATTR {
-    along_row(row, [&](int i) HWY_ATTR {
+    along_row(row, extent, [&](int i) HWY_ATTR {
       const FloatVec product = hn::Add(hn::Add(hn::Mul(at(p.x, i), x), hn::Mul(at(p.y, i), y)),
                                        hn::Add(hn::Mul(at(p.z, i), z), at(p.outside, i)));
       all = hn::And(all, hn::Ge(product, least));
@@ -117,9 +135,11 @@ HWY_INLINE bool within_a_cone(const Planes& p, const FloatVec sum[3], const std:
 std::array<uint64_t, 8> interior_voxels(const SurfaceTile& tile, const std::array<uint64_t, 8>& candidate,
                                         float band_m, float cos_limit) {
   const int lanes = int(hn::Lanes(kF));
+  if (std::all_of(candidate.begin(), candidate.end(), [](uint64_t word) { return word == 0; })) return candidate;
+  const Extent extent = extent_along_rows(candidate);
   Planes p;
   for_each_row(rows_near(candidate, 2), [&](int row, int, int) HWY_ATTR {
-    along_row(row, [&](int i) HWY_ATTR {
+    along_row(row, extent, [&](int i) HWY_ATTR {
       const FloatVec below = at(tile.tsdf, i - 1), above = at(tile.tsdf, i + 1);
       hn::StoreU(hn::Add(hn::Add(below, at(tile.tsdf, i)), above), kF, p.sum_z + i);
       hn::StoreU(hn::Sub(above, below), kF, p.rise_z + i);
@@ -129,9 +149,9 @@ std::array<uint64_t, 8> interior_voxels(const SurfaceTile& tile, const std::arra
   FloatVec sum[3] = {hn::Zero(kF), hn::Zero(kF), hn::Zero(kF)};
   const FloatVec band = hn::Set(kF, band_m);
   for_each_row(near, [&](int row, int, int) HWY_ATTR {
-    along_row(row, [&](int i) HWY_ATTR { measure_normals(tile, band, i, p, sum); });
+    along_row(row, extent, [&](int i) HWY_ATTR { measure_normals(tile, band, i, p, sum); });
   });
-  if (within_a_cone(p, sum, near, cos_limit)) return candidate;
+  if (within_a_cone(p, sum, near, extent, cos_limit)) return candidate;
 
   std::array<uint64_t, 8> interior{};
   const FloatVec least = hn::Set(kF, cos_limit);

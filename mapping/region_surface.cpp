@@ -159,7 +159,7 @@ double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule&
     };
     for_each_bit(band, [&](int offset) {
       const Index3 v = voxel_of_offset(offset);
-      if (!is_near(v)) return;
+      if (!is_near(v) || (f.x + v.x + f.y + v.y + f.z + v.z) % 2 != 0) return;  // every other voxel says enough
       const SurfaceNormal own = smoothed_normal(tile, SurfaceTile::index(v.x, v.y, v.z));
       for (const Index3& u : {Index3{v.x + 1, v.y, v.z}, {v.x, v.y + 1, v.z}, {v.x, v.y, v.z + 1}}) {
         const int at = SurfaceTile::index(u.x, u.y, u.z);

@@ -44,7 +44,7 @@ using BlockNeighbours = std::array<const Block*, 27>;
 BlockSurface examine_block(const BlockNeighbours& near, const SurfaceRule& rule);
 
 /// How noisy the surface is around a voxel: the median angle, degrees, between the normals of face neighbours of the
-/// band within eight voxels of it. 0 where there are none.
+/// band within eight voxels of it (those ahead of every other voxel). 0 where there are none.
 double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule& rule);
 
 /// Unit normal of the surface at a voxel, towards free space: `smoothed_normal` (mapping/interior_kernels.h). Zero where

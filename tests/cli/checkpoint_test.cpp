@@ -124,7 +124,7 @@ TEST_CASE("touches of a run that is stopped before, between and after them make 
   // The room's touches belong to frames 4, 9, 14 and 19 of 24.
   const TemporaryDirectory folder;
   const fs::path room = source_dir() / "data/scenes/room", whole = folder.path() / "whole", out = folder.path() / "out";
-  const std::string options = "--no-color --checkpoint 1";
+  const std::string options = "--no-color --checkpoint 4";
   REQUIRE(run_feltmap(reconstruct(room, whole, options)).exit_code == 0);
   const json expected = json::parse(file_text(whole / "report.json"));
   REQUIRE(expected.at("touches").at("applied") == 4);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <set>
 
@@ -104,6 +105,57 @@ TEST_CASE("a region stops at a crease between two surfaces of one class") {
       for (int z = -1; z <= 1; ++z, ++floor_expected) REQUIRE(floor.contains({x, y, z}));
   CHECK(floor.voxels() >= floor_expected);
   CHECK(intersected(floor, wall).empty());
+}
+
+TEST_CASE("a crease stops every region whose limit is below half the angle by which the surface turns") {
+  for (const double turn_deg : {44.0, 62.0, 90.0})
+    for (const double shift : {0.0, 0.3, 0.5, 0.8}) {
+      const double turn = turn_deg * std::numbers::pi / 180;
+      const auto ramp = [&](const Eigen::Vector3d& p) {
+        return (p.z() - 0.6 * shift * kVoxel) * std::cos(turn) - (p.x() - shift * kVoxel) * std::sin(turn);
+      };
+      const Map map = labelled_map(
+          kVoxel, {-0.4, -0.2, -0.1}, {0.4, 0.2, 0.4},
+          [&](const Eigen::Vector3d& p) { return std::min(p.z() - 0.6 * shift * kVoxel, ramp(p)); },
+          class_table({"floor"}), [](const Eigen::Vector3d&) { return 0; });
+      const auto reaches_ramp = [&](double limit_deg) {
+        RegionSettings settings;
+        settings.normal_change_deg = limit_deg;
+        const Contact contact = find_contact(map, {-0.25, 0, 0}, settings);
+        CHECK(normal_limit_deg(map, contact, settings) == limit_deg);
+        const std::set<Index3> region = voxels_of(find_region(map, contact, settings));
+        return std::any_of(region.begin(), region.end(), [](const Index3& v) { return v.z >= 5; });
+      };
+      INFO(turn_deg << " degrees, " << shift);
+      CHECK_FALSE(reaches_ramp(turn_deg / 2 - 1));
+      CHECK(reaches_ramp(turn_deg));
+    }
+}
+
+TEST_CASE("the limit between normals grows with their noise, up to 30 degrees, and noisy surfaces stay whole") {
+  std::mt19937 rng(1);
+  std::normal_distribution<double> normal;
+  double last_deg = 0;
+  for (const double noise_voxels : {0.0, 0.1, 0.3, 0.6, 1.0}) {
+    const Map map = labelled_map(
+        kVoxel, {-0.5, -0.5, -0.2}, {0.5, 0.5, 0.2},
+        [&](const Eigen::Vector3d& p) { return p.z() + noise_voxels * kVoxel * normal(rng); }, class_table({"floor"}),
+        [](const Eigen::Vector3d&) { return 0; });
+    RegionSettings settings;
+    settings.snap_voxels = 1;
+    const Contact contact = find_contact(map, {0, 0, 0}, settings);
+    const double limit_deg = normal_limit_deg(map, contact, settings);
+    INFO(noise_voxels << " voxels of noise: " << limit_deg << " degrees");
+    CHECK(limit_deg >= last_deg);
+    CHECK(limit_deg >= 20);
+    CHECK(limit_deg <= 30);
+    if (noise_voxels == 0) CHECK(limit_deg == 20);
+    if (noise_voxels == 1) CHECK(limit_deg == 30);
+    if (noise_voxels <= 0.3) CHECK(find_region(map, contact, settings).voxels() > 0.9 * 51 * 51 * 2);
+    last_deg = limit_deg;
+    settings.normal_change_deg = 50;
+    CHECK(normal_limit_deg(map, contact, settings) == 50);
+  }
 }
 
 TEST_CASE("a region stops at the border of another class and passes voxels with little contrary evidence") {
