@@ -1,7 +1,7 @@
 // Save and load of the map file against OpenVDB's own stream on the same grids, with one thread, in a folder that is in
 // memory. Rates are bytes of planes in memory (what the map holds) per second of processor time of the whole call.
 //   bench_map_file fast|none|blosc|zip [blocks along a side of the wall] [folder]
-//   bench_map_file grids                   memory with 1,000 grids
+//   bench_map_file grids [blocks along a side of the wall] [folder]       memory with 1,000 grids
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 #include <sys/resource.h>
@@ -132,9 +132,10 @@ double peak_rss_mib() {
   return double(usage.ru_maxrss) / 1024;
 }
 
-void measure_memory(const fs::path& folder) {
-  const Map map = wall(40, 1000);
-  std::printf("1,000 classes, %.0f MB of planes: peak %.0f MiB before saving", plane_bytes(map) / 1e6, peak_rss_mib());
+void measure_memory(int side, const fs::path& folder) {
+  const Map map = wall(side, 1000);
+  std::printf("1,000 classes, %zu blocks, %.0f MB of planes: peak %.0f MiB before saving", map.store.size(),
+              plane_bytes(map) / 1e6, peak_rss_mib());
   const double save_s = seconds([&] { save_map(map, folder / "map.vdb"); });
   std::printf(", %.0f MiB after saving in %.2f s", peak_rss_mib(), save_s);
   const double load_s = seconds([&] { require_same(load_map(folder / "map.vdb"), map); });
@@ -151,7 +152,7 @@ int main(int argc, char** argv) {
   const fs::path folder = fs::path(argc > 3 ? argv[3] : "/dev/shm") / ("feltmap-bench-" + std::to_string(getpid()));
   fs::create_directories(folder);
   if (what == "grids") {
-    measure_memory(folder);
+    measure_memory(side, folder);
   } else {
     const MapCompression compression = what == "none"    ? MapCompression::none
                                        : what == "zip"   ? MapCompression::zip
