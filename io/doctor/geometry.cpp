@@ -11,7 +11,7 @@ namespace {
 constexpr double kCostOfChange = 0.02;
 /// Score by which a right focal length, scale or delay raises a reading at most that is right in all else.
 constexpr double kOvertakes = 1;
-/// Score that the camera's way has to earn for a scale to be told from it.
+/// Score that the camera's way has to earn for a scale to be told from it, and three quarters of the pairs agree.
 constexpr double kLeastParallax = 0.05;
 
 class Search {
@@ -187,7 +187,7 @@ bool shows_scale(const GeometrySample& sample, const Reading& reading) {
   const auto scores = [&](const Reading& r) {
     return cross_project(sample.frames, sample.pairs, sample.trajectory, sample.camera, r);
   };
-  return compare(scores(turning), scores(reading)).gain > kLeastParallax;
+  return convincing(compare(scores(turning), scores(reading)), kLeastParallax);
 }
 
 }  // namespace
