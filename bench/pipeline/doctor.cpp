@@ -35,6 +35,13 @@ std::string accused_topics(const Examination& examination) {
   return topics;
 }
 
+/// What the doctor measured about a topic, for the reader of a miss.
+void print_evidence(const Examination& examination, const std::string& topics) {
+  for (const Finding& finding : examination.findings)
+    if (topics.find(finding.topic) != std::string::npos)
+      std::printf("%30s %s: %s; %s\n", "", finding.topic.c_str(), finding.belief.c_str(), finding.evidence.c_str());
+}
+
 bool names(const Examination& examination, const std::string& topic) {
   for (const Finding& finding : examination.findings)
     if (finding.faulty && finding.topic == topic) return true;
@@ -75,6 +82,7 @@ void examine_recording(const Recording& recording, Tally& tally) {
     clean &= !sound.faulty();
     std::printf("%-26.26s %-28s %s\n", name, "(sound)",
                 sound.faulty() ? ("ACCUSED of " + accused_topics(sound)).c_str() : "ok");
+    print_evidence(sound, accused_topics(sound));
   }
   tally.table["(sound)"][recording.name] = clean ? "clean" : "**accused**";
   for (const corrupt::Fault& fault : corrupt::faults()) {
@@ -88,8 +96,9 @@ void examine_recording(const Recording& recording, Tally& tally) {
     ++tally.cases;
     std::string said;
     bool hit = false;
+    Examination examination;
     try {
-      const Examination examination = examine_sequence(out);
+      examination = examine_sequence(out);
       hit = names(examination, fault.topic);
       said = accused_topics(examination);
     } catch (const std::exception& error) {
@@ -98,6 +107,7 @@ void examine_recording(const Recording& recording, Tally& tally) {
     tally.named += hit;
     cell = hit ? "yes" : "**no**";
     std::printf("%-26.26s %-28s %-6s %s\n", name, fault.name.c_str(), hit ? "named" : "MISSED", said.c_str());
+    if (!hit) print_evidence(examination, fault.topic + " " + said);
     std::fflush(stdout);
   }
   std::printf("%-26.26s %.1f s\n", name, seconds_since(start));

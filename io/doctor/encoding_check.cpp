@@ -14,10 +14,11 @@ namespace {
 /// Share of neighbours (side by side, and one above the other) that differ by more than a quarter.
 struct Roughness {
   double across = 0, down = 0;
+  double wraps = 0;  ///< share of those side by side of which one is near 0 and the other near the largest of 16 bits
 };
 
-/// `width`: of the rows that the image's values are taken to form.
-Roughness roughness_of(const DepthImage& depth, int width) {
+/// `width`: of the rows that the image's values are taken to form. `full_scale_m`: the largest number of 16 bits.
+Roughness roughness_of(const DepthImage& depth, int width, double full_scale_m) {
   Roughness roughness;
   double across = 0, down = 0;
   const int height = int(depth.size()) / width;
@@ -25,10 +26,16 @@ Roughness roughness_of(const DepthImage& depth, int width) {
   for (int v = 0; v + 1 < height; v += 2)
     for (int u = 0; u + 1 < width; u += 2) {
       const float* const here = depth.data() + size_t(v) * width + u;
-      if (here[0] > 0 && here[1] > 0) ++across, roughness.across += jumps(here[0], here[1]);
+      if (here[0] > 0 && here[1] > 0) {
+        ++across;
+        roughness.across += jumps(here[0], here[1]);
+        const auto [least, most] = std::minmax(here[0], here[1]);
+        roughness.wraps += most > 0.9 * full_scale_m && least < 0.1 * full_scale_m;
+      }
       if (here[0] > 0 && here[width] > 0) ++down, roughness.down += jumps(here[0], here[width]);
     }
   roughness.across /= std::max(1.0, across);
+  roughness.wraps /= std::max(1.0, across);
   roughness.down /= std::max(1.0, down);
   return roughness;
 }
@@ -46,10 +53,11 @@ std::vector<DepthImage> few_depths(const std::filesystem::path& path, const Sequ
   return depths;
 }
 
-Roughness mean_roughness(const std::vector<DepthImage>& depths, bool swapped) {
+Roughness mean_roughness(const std::vector<DepthImage>& depths, bool swapped, double full_scale_m) {
   Roughness mean;
   for (const DepthImage& depth : depths) {
-    const Roughness one = roughness_of(depth, swapped ? depth.height() : depth.width());
+    const Roughness one = roughness_of(depth, swapped ? depth.height() : depth.width(), full_scale_m);
+    mean.wraps += one.wraps / double(depths.size());
     mean.across += one.across / double(depths.size());
     mean.down += one.down / double(depths.size());
   }
@@ -127,7 +135,8 @@ std::vector<Finding> check_depth_images(const std::filesystem::path& path, const
                                         SequenceListing& listing) {
   const std::vector<DepthImage> now = few_depths(path, options, listing);
   if (now.empty()) return {};
-  const Roughness as_read = mean_roughness(now, false), swapped = mean_roughness(now, true);
+  const double full_scale_m = 65535 / listing.depth_scale;
+  const Roughness as_read = mean_roughness(now, false, full_scale_m), swapped = mean_roughness(now, true, full_scale_m);
   Finding encoding{"depth-encoding", false, 0.95, "depth is stored as plain numbers", "", ""};
   if (listing.depth_encoding == DepthEncoding::rotated3)
     encoding.belief = "depth is stored with its bits rotated by three";
@@ -137,13 +146,18 @@ std::vector<Finding> check_depth_images(const std::filesystem::path& path, const
   const bool rotated_now = listing.depth_encoding == DepthEncoding::rotated3;
   other.depth_encoding = rotated_now ? DepthEncoding::plain : DepthEncoding::rotated3;
   const std::vector<DepthImage> otherwise = few_depths(path, options, other);
-  const double other_across = otherwise.empty() ? 1 : mean_roughness(otherwise, false).across;
+  const Roughness otherwise_read =
+      otherwise.empty() ? Roughness{1, 1, 1} : mean_roughness(otherwise, false, full_scale_m);
+  const double other_across = otherwise_read.across;
   // Smooth close-ups wrap around seldom, so the share itself says little: what tells is that it falls when read
   // otherwise.
-  if (as_read.across > 0.05 && other_across < 0.4 * as_read.across) {
+  // Where bits are rotated, numbers run over: beside the largest stands one near 0. No surface does that.
+  const bool runs_over = as_read.wraps > 0.001 && otherwise_read.wraps < 0.1 * as_read.wraps;
+  if ((as_read.across > 0.05 || runs_over) && other_across < 0.4 * as_read.across) {
     encoding.faulty = true;
     encoding.belief = rotated_now ? "depth is stored as plain numbers"
                                   : "the bits of depth are rotated by three (picking challenge, SUN RGB-D)";
+    if (runs_over) encoding.evidence += ", " + percent(as_read.wraps) + " from near 0 to near the largest number";
     encoding.evidence += ", but " + percent(other_across) + " read so";
     encoding.remedy = rotated_now ? "--depth-encoding plain" : "--depth-encoding rotated3 --depth-scale 10000";
     if (rotated_now != (listing.depth_scale == 10000)) other.depth_scale = rotated_now ? 1000 : 10000;

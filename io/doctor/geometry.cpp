@@ -11,6 +11,8 @@ namespace {
 constexpr double kCostOfChange = 0.02;
 /// Score by which a right focal length, scale or delay raises a reading at most that is right in all else.
 constexpr double kOvertakes = 1;
+/// Score that the camera's way has to earn for a scale to be told from it, and three quarters of the pairs agree.
+constexpr double kLeastParallax = 0.05;
 
 class Search {
 public:
@@ -93,16 +95,17 @@ Candidate with_known_scale(const Search& search, Candidate candidate, double sca
   return candidate;
 }
 
-Candidate refined(const Search& search, Candidate candidate, const GeometrySample& sample) {
+Candidate refined(const Search& search, Candidate candidate, const GeometrySample& sample, bool any_scale) {
   const double range = std::max(sample.stamped ? 0.12 : 0.0, 2 * sample.trajectory.spacing);
   std::vector<double> delays;
   for (int i = -16; i <= 16; ++i) delays.push_back(range * i / 16);
   for (int round = 0; round < 2; ++round) {
     const double before = candidate.value;
-    std::vector<Candidate> singles = {
-        swept(search, candidate, &Reading::focal_factor, geometric(0.5, 2, 24), true),
-        swept(search, candidate, &Reading::depth_factor,
-              geometric(candidate.reading.depth_factor / 64, candidate.reading.depth_factor * 64, 48), true)};
+    std::vector<Candidate> singles = {swept(search, candidate, &Reading::focal_factor, geometric(0.5, 2, 24), true)};
+    if (any_scale)
+      singles.push_back(swept(search, candidate, &Reading::depth_factor,
+                              geometric(candidate.reading.depth_factor / 64, candidate.reading.depth_factor * 64, 48),
+                              true));
     if (sample.trajectory.spacing > 0) singles.push_back(swept(search, candidate, &Reading::pose_delay, delays, false));
     for (const Candidate& single : singles)
       if (single.value > candidate.value) candidate = single;
@@ -137,11 +140,13 @@ bool convincing(const Comparison& comparison, double least_gain) {
   return comparison.gain > least_gain && comparison.decided >= 3 && comparison.won >= 0.75 * comparison.decided;
 }
 
-Reading best_reading(const GeometrySample& sample, bool thorough) {
+namespace {
+
+Reading search_best(const GeometrySample& sample, bool thorough, bool any_scale) {
   const Search search(sample);
   std::vector<double> factors = {1};
   for (const double scale : kDepthScales)
-    if (scale != sample.depth_scale) factors.push_back(sample.depth_scale / scale);
+    if (any_scale && scale != sample.depth_scale) factors.push_back(sample.depth_scale / scale);
   const PinholeCamera& camera = sample.camera;
   const bool may_be_swapped = std::abs(camera.cx - camera.cy) > 0.02 * camera.width || camera.fx != camera.fy;
 
@@ -169,10 +174,27 @@ Reading best_reading(const GeometrySample& sample, bool thorough) {
     std::erase_if(candidates, [&](const Candidate& c) { return c.value < least || c.reading == as_is.reading; });
     candidates.resize(std::min<size_t>(candidates.size(), 3));
     candidates.push_back(as_is);
-    for (Candidate& candidate : candidates) candidate = refined(search, candidate, sample);
+    for (Candidate& candidate : candidates) candidate = refined(search, candidate, sample, any_scale);
     std::stable_sort(candidates.begin(), candidates.end(), better);
   }
   return candidates.front().reading;
+}
+
+/// Whether the camera's way says how large things are: views that fit as well were the camera only turning do not.
+bool shows_scale(const GeometrySample& sample, const Reading& reading) {
+  Reading turning = reading;
+  turning.depth_factor = 1e6;  // beside such depth no way counts
+  const auto scores = [&](const Reading& r) {
+    return cross_project(sample.frames, sample.pairs, sample.trajectory, sample.camera, r);
+  };
+  return convincing(compare(scores(turning), scores(reading)), kLeastParallax);
+}
+
+}  // namespace
+
+Reading best_reading(const GeometrySample& sample, bool thorough) {
+  const Reading best = search_best(sample, thorough, true);
+  return best.depth_factor == 1 || shows_scale(sample, best) ? best : search_best(sample, thorough, false);
 }
 
 }  // namespace felt

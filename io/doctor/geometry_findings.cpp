@@ -6,6 +6,9 @@
 namespace felt {
 namespace {
 
+/// Fewer frames than these fit a trajectory by any delay.
+constexpr size_t kFramesForDelay = 8;
+
 std::string percent(double share) { return number_text(100 * share, "%.2g") + " %"; }
 
 /// Mean over pairs that see each other.
@@ -144,7 +147,9 @@ std::vector<Finding> geometry_findings(const GeometrySample& sample, const Readi
                                                     with_focal(best, best.focal_factor / 1.1)});
   if (sample.trajectory.spacing > 0) {
     const double spacing = sample.trajectory.spacing, delay = best.pose_delay;
-    const bool delay_differs = std::abs(delay) > (sample.stamped ? 0.025 : 0.15 * spacing);
+    // Real sensors are up to 25 ms apart; frames that only have numbers are taken for 30 a second.
+    const bool delay_differs = std::abs(delay) > (sample.stamped ? 0.025 : std::max(0.75, 0.15 * spacing)) &&
+                               sample.frames.size() >= kFramesForDelay;
     const std::string unit = sample.stamped ? " s" : " frame numbers";
     findings.add("stamp-offset", delay_differs,
                  std::abs(delay) > 0 ? "poses fit best when taken " + number_text(std::abs(delay)) + unit +

@@ -147,8 +147,8 @@ std::optional<Finding> check_labels(const GeometrySample& sample, const Reading&
   };
   finding.evidence = range + "; " + text(fits[0]);
   const double gain = value(fits[best]) - value(fits[0]);
-  // That other names would lie as such accuses nobody whose own names say nothing of how they lie.
-  const bool tells = fits[0].named > 0.02 || fits[0].unknown > 0.01;
+  // That other names would lie as such too accuses nobody: the own names must lie badly, or be none.
+  const bool tells = fits[0].unknown > 0.01 || (fits[0].named > 0.02 && fits[0].lies_well < fits[best].lies_well - 0.1);
   if (best != 0 && gain > 0.05 && tells) {
     finding.faulty = true;
     finding.confidence = std::min(0.99, 0.6 + gain);

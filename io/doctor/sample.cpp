@@ -49,8 +49,12 @@ std::vector<Pair> pairs_of(const std::vector<SampledFrame>& frames, int64_t coun
   // Enough to vote; every n-th of them, so that short and long distances stay.
   constexpr size_t kMostPairs = 96;
   std::vector<Pair> kept;
-  for (size_t i = 0; i < std::min(kMostPairs, pairs.size()); ++i)
-    kept.push_back(pairs[i * pairs.size() / std::min(kMostPairs, pairs.size())]);
+  for (size_t i = 0; i < std::min(kMostPairs, pairs.size()); ++i) {
+    const Pair pair = pairs[i * pairs.size() / std::min(kMostPairs, pairs.size())];
+    // Forward and backward in turn: noise weighs more in a view from nearer by, and a reading that turns the camera's
+    // way around must not win by that.
+    kept.push_back(i % 2 == 0 ? pair : Pair{pair.b, pair.a});
+  }
   return kept;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -56,6 +57,39 @@ double smoothness(const RecordedTrajectory& trajectory) {
   return near.empty() ? 0 : middle(near) / std::max(1e-9, middle(any));
 }
 
+/// How many of the sampled frames fit their neighbours better with the pose of another frame, which fits better in
+/// turn: none where poses are in order.
+int better_exchanged(const GeometrySample& sample, const Reading& reading) {
+  constexpr int kEvery = 2;
+  RecordedTrajectory trajectory = sample.trajectory;
+  const auto place = [&](int frame) {
+    const auto& positions = trajectory.position;
+    const int64_t position = sample.frames[size_t(frame)].position;
+    return size_t(std::lower_bound(positions.begin(), positions.end(), position) - positions.begin());
+  };
+  const std::vector<PairScore> all =
+      cross_project(sample.frames, sample.pairs, trajectory, sample.camera, reading, kEvery);
+  std::set<int> exchanged;
+  for (int a = 0; a < int(sample.frames.size()); ++a)
+    for (int b = a + 1; b < int(sample.frames.size()); ++b) {
+      std::vector<Pair> pairs;
+      std::vector<PairScore> now;
+      for (size_t i = 0; i < sample.pairs.size(); ++i) {
+        const Pair pair = sample.pairs[i];
+        // The pair of both is seen from the other side, which says nothing.
+        if ((pair.a == a || pair.b == a) == (pair.a == b || pair.b == b)) continue;
+        pairs.push_back(pair), now.push_back(all[i]);
+      }
+      if (pairs.size() < 3) continue;
+      std::swap(trajectory.recorded[place(a)], trajectory.recorded[place(b)]);
+      const std::vector<PairScore> then =
+          cross_project(sample.frames, pairs, trajectory, sample.camera, reading, kEvery);
+      std::swap(trajectory.recorded[place(a)], trajectory.recorded[place(b)]);
+      if (convincing(compare(now, then))) exchanged.insert({a, b});
+    }
+  return int(exchanged.size());
+}
+
 /// Frames of trajectory positions [first, last], decoded; nothing for those that cannot be read.
 std::vector<SampledFrame> decode(const RecordedTrajectory& trajectory, size_t first, size_t last,
                                  const SequenceReader& reader) {
@@ -74,8 +108,10 @@ Finding check_trajectory(const GeometrySample& sample, const Reading& best, cons
   Finding finding{"trajectory", false, 0.9, "the trajectory is continuous and fits the images", "", ""};
   const RecordedTrajectory& trajectory = sample.trajectory;
   std::map<int, Pair> nearest;
-  for (const Pair& pair : sample.pairs)
+  for (const Pair& either : sample.pairs) {
+    const Pair pair{std::min(either.a, either.b), std::max(either.a, either.b)};
     if (const auto [at, is_new] = nearest.emplace(pair.a, pair); !is_new && pair.b < at->second.b) at->second = pair;
+  }
   std::vector<Pair> neighbours;
   for (const auto& [a, pair] : nearest) neighbours.push_back(pair);
   const std::vector<PairScore> scores = cross_project(sample.frames, neighbours, trajectory, sample.camera, best);
@@ -83,12 +119,19 @@ Finding check_trajectory(const GeometrySample& sample, const Reading& best, cons
   const double share = scores.empty() ? 1 : fitting / double(scores.size());
   finding.evidence = std::to_string(int(fitting)) + " of " + std::to_string(scores.size()) +
                      " neighbouring frame pairs see the same surface";
-  if (scores.size() >= 3 && share < 0.5) {
+  // Poses that are told a delay are between frames: which of them is whose cannot be asked.
+  const bool slow = share >= 0.5 && best.pose_delay == 0;
+  const int exchanged = slow && scores.size() >= 3 ? better_exchanged(sample, best) : 0;
+  const bool disordered = exchanged >= 3 && exchanged >= 0.4 * double(sample.frames.size());
+  if (scores.size() >= 3 && (share < 0.5 || disordered)) {
     const double rough = smoothness(trajectory);
     finding.faulty = true;
-    finding.confidence = std::min(0.97, 1 - share);
-    finding.belief =
-        rough > 0.5 ? "poses are in another order than the images (shuffled)" : "poses do not belong to these images";
+    finding.confidence = disordered ? 0.8 : std::min(0.97, 1 - share);
+    if (disordered)
+      finding.evidence += "; " + std::to_string(exchanged) + " of " + std::to_string(sample.frames.size()) +
+                          " frames fit better with the pose of another";
+    finding.belief = disordered || rough > 0.5 ? "poses are in another order than the images (shuffled)"
+                                               : "poses do not belong to these images";
     finding.evidence +=
         "; a step of the trajectory is " + number_text(100 * rough, "%.0f") + " % of the way between any two poses";
     finding.remedy = "no option mends it: take poses and images of the same recording, in the same order";
@@ -105,14 +148,17 @@ Finding check_trajectory(const GeometrySample& sample, const Reading& best, cons
     const size_t across = from - first;
     // Score of a point in view: a quarter of a room's surfaces meet themselves after any jump.
     const auto per_point = [](const PairScore& score) { return score.score / std::max(0.01, score.in_view); };
-    bool others_fit = true;
-    double worst_other = per_point(around[across == 0 ? 1 : 0]);
+    const auto step = [&](size_t i) { return trajectory.stamp[first + i + 1] - trajectory.stamp[first + i]; };
+    bool others_fit = true, any_other = false;
+    double worst_other = std::numeric_limits<double>::infinity();
     for (size_t i = 0; i < around.size(); ++i) {
-      if (i == across) continue;
+      // Views a much longer time apart say nothing of this step.
+      if (i == across || step(i) > 3 * step(across)) continue;
+      any_other = true;
       others_fit &= fits(around[i]);
       worst_other = std::min(worst_other, per_point(around[i]));
     }
-    if (others_fit && (around[across].in_view < 0.05 || per_point(around[across]) < 0.5 * worst_other))
+    if (any_other && others_fit && (around[across].in_view < 0.05 || per_point(around[across]) < 0.5 * worst_other))
       jumps.push_back(trajectory.index[from + 1]);
   }
   if (jumps.empty()) return finding;
@@ -120,7 +166,7 @@ Finding check_trajectory(const GeometrySample& sample, const Reading& best, cons
   finding.confidence = 0.9;
   finding.belief = "the trajectory jumps at frame " + std::to_string(jumps.front());
   for (size_t i = 1; i < jumps.size(); ++i) finding.belief += ", " + std::to_string(jumps[i]);
-  finding.evidence = "surfaces fit on both sides of each jump, but not across it";
+  finding.evidence = "surfaces fit beside each jump, but not across it";
   finding.remedy = "reconstruct the parts on their own with --frames";
   return finding;
 }
