@@ -38,7 +38,7 @@ std::vector<Eigen::Isometry3d> poses_of(const json& rows) {
 }
 
 json progress_of(const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints, bool complete,
-                 const std::string& recording) {
+                 const std::string& touches, const std::string& recording) {
   json unknown = json::array();
   for (const auto& [id, pixels] : record.unknown_ids) unknown.push_back({id, pixels});
   return {{"recording", recording},
@@ -49,6 +49,7 @@ json progress_of(const FusionRecord& record, const std::vector<Eigen::Isometry3d
           {"label_voxels", {record.labels.voxels, record.labels.unknown, record.labels.invalid}},
           {"unknown_ids", unknown},
           {"ignored_pixels", record.ignored_pixels},
+          {"touches", touches},
           {"viewpoints", poses_json(viewpoints)}};
 }
 
@@ -75,6 +76,7 @@ void read_progress(const json& progress, const std::string& where, Checkpoint& c
     progress.at("ignored_pixels").get_to(record.ignored_pixels);
     checkpoint.viewpoints = poses_of(progress.at("viewpoints"));
     progress.at("complete").get_to(checkpoint.complete);
+    checkpoint.touches = progress.value("touches", "");
   } catch (const json::exception& fault) {
     throw FormatError(describe_mismatch(where, "text 'progress'", "what reconstruct counts", fault.what()));
   }
@@ -103,10 +105,10 @@ std::string fusion_settings(const nlohmann::ordered_json& config) {
 }
 
 void save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
-                     bool complete, const std::string& recording, const nlohmann::ordered_json& config,
-                     const std::filesystem::path& path) {
+                     bool complete, const std::string& touches, const std::string& recording,
+                     const nlohmann::ordered_json& config, const std::filesystem::path& path) {
   map.metadata[kConfig] = config.dump();
-  map.metadata[kProgress] = progress_of(record, viewpoints, complete, recording).dump();
+  map.metadata[kProgress] = progress_of(record, viewpoints, complete, touches, recording).dump();
   // On the way nobody looks at views, and they take longer than the rest.
   save_map(map, path, {.views = complete || !record.stopped.empty()});
 }
@@ -120,7 +122,7 @@ std::optional<Checkpoint> resume(const std::filesystem::path& path, const std::s
   if (progress.value("recording", json()) != recording)
     throw ConfigError(describe_mismatch("--resume", "recording", "the one that " + where + " was made of", "another"));
   require_same_run(text_of(map, kConfig, where), json(config), where);
-  Checkpoint checkpoint{std::move(map), {}, {}, false};
+  Checkpoint checkpoint{std::move(map), {}, {}, false, {}};
   read_progress(progress, where, checkpoint);
   return checkpoint;
 }

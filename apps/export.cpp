@@ -95,6 +95,7 @@ json write_surface(const Map& map, const Region* part, const ExportOptions& o) {
   const SurfaceColor color = parse_surface_color(o.color_by, map);
   std::vector<VertexEdge> edges;
   TriangleMesh mesh = extract_mesh(map, {}, &edges);
+  attach_beliefs(map, edges, mesh);
   const std::optional<ColorRange> range = color_surface(map, edges, color, mesh);
   if (part != nullptr) {
     std::vector<bool> inside(edges.size());

@@ -1,9 +1,9 @@
-#include <openvdb/openvdb.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <type_traits>
+#include <vector>
 
 #include "apps/command.h"
 #include "apps/commands.h"
@@ -30,23 +30,31 @@ Json classes_json(const ClassTable& table) {
   return classes;
 }
 
-/// Per grid what its active voxels hold: how many, and of numbers the least, greatest and mean.
+/// Of numbers also the least, greatest and mean active value.
+template <typename Value>
+Json grid_json(const Leaves<Value>& leaves) {
+  uint64_t active_voxels = 0;
+  double sum = 0, least = std::numeric_limits<double>::infinity(), greatest = -least;
+  std::vector<Value> values(kBlockVoxels);
+  for (size_t i = 0; i < leaves.coords->size(); ++i)
+    for_each_bit(leaves.fill(i, values.data()), [&](int v) {
+      ++active_voxels;
+      if constexpr (std::is_same_v<Value, float>) {
+        const double value = double(values[size_t(v)]);
+        sum += value, least = std::min(least, value), greatest = std::max(greatest, value);
+      }
+    });
+  Json entry = {{"active_voxels", active_voxels}};
+  if (std::is_same_v<Value, float> && active_voxels > 0)
+    entry.update({{"least", least}, {"greatest", greatest}, {"mean", sum / double(active_voxels)}});
+  return entry;
+}
+Json grid_json(const Region& region) { return {{"active_voxels", region.voxels()}}; }
+
 Json grids_json(const Map& map) {
   Json grids = Json::object();
-  for (const MapGrid& grid : map_grids(map)) {
-    const openvdb::GridBase::Ptr made = grid.make();
-    Json& entry = grids[grid.name] = {{"active_voxels", made->activeVoxelCount()}};
-    const auto values = openvdb::gridPtrCast<openvdb::FloatGrid>(made);
-    if (values == nullptr || values->tree().leafCount() == 0) continue;
-    double sum = 0, least = std::numeric_limits<double>::infinity(), greatest = -least;
-    for (auto value = values->cbeginValueOn(); value; ++value) {
-      sum += double(*value);
-      least = std::min(least, double(*value));
-      greatest = std::max(greatest, double(*value));
-    }
-    entry["least"] = least, entry["greatest"] = greatest;
-    entry["mean"] = sum / double(std::max<openvdb::Index64>(1, made->activeVoxelCount()));
-  }
+  for (const LeafGrid& grid : map_grids(map))
+    grids[grid.name] = std::visit([](const auto& leaves) { return grid_json(leaves); }, grid.leaves);
   return grids;
 }
 

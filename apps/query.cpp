@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -24,7 +25,18 @@ struct QueryOptions : CommonOptions {
   std::optional<double> below;
 };
 
-json answer(const Map& map, Beliefs& beliefs, const Eigen::Vector3d& point, std::optional<double> below) {
+bool has_instances(const Map& map) {
+  return std::ranges::any_of(map.store.blocks(), [](const Block& b) { return b.instance != nullptr; });
+}
+
+/// The thing that a voxel belongs to: the id that leads the votes, and by how much; null where none does.
+json instance_json(const Block& block, int offset) {
+  if (block.instance == nullptr || block.instance->votes[offset] == 0) return nullptr;
+  return {{"id", block.instance->id[offset]}, {"votes", block.instance->votes[offset]}};
+}
+
+json answer(const Map& map, Beliefs& beliefs, const Eigen::Vector3d& point, std::optional<double> below,
+            bool instances) {
   json out;
   out["point_m"] = point_json(point);
   const Eigen::Vector3d q = point / map.voxel_size_m;
@@ -45,6 +57,7 @@ json answer(const Map& map, Beliefs& beliefs, const Eigen::Vector3d& point, std:
   const double trilinear = double(sample_tsdf(map, point.x(), point.y(), point.z()));
   out["signed_distance_m"] = std::isnan(trilinear) ? double(block->geometry->tsdf[offset_in_block(voxel)]) : trilinear;
   out.update(belief_json(map, beliefs.at(voxel), below));
+  if (instances) out["instance"] = instance_json(*block, offset_in_block(voxel));
   return out;
 }
 
@@ -56,8 +69,9 @@ int run_query(const QueryOptions& options) {
   if (!options.file.empty())
     for (const Eigen::Vector3d& p : read_points(options.file)) points.push_back(p);
   Beliefs beliefs(map);
+  const bool instances = has_instances(map);
   json all = json::array();
-  for (const Eigen::Vector3d& point : points) all.push_back(answer(map, beliefs, point, options.below));
+  for (const Eigen::Vector3d& point : points) all.push_back(answer(map, beliefs, point, options.below, instances));
   if (options.json) {
     std::printf("%s\n", json{{"points", all}}.dump(2).c_str());
     return kDone;
@@ -74,6 +88,8 @@ int run_query(const QueryOptions& options) {
       std::printf(", %s %.3f, entropy %.3f", a["class"].get<std::string>().c_str(),
                   a["class_probability"][a["class"].get<std::string>()].get<double>(),
                   a["class_entropy"].get<double>());
+    if (a.contains("instance"))
+      std::printf(", %s", a["instance"].is_null() ? "no instance" : ("instance " + a["instance"]["id"].dump()).c_str());
     std::printf("\n%s", property_text(a).c_str());
   }
   return kDone;

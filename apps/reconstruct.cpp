@@ -30,6 +30,7 @@
 #include "io/system_memory.h"
 #include "mapping/marching_cubes.h"
 #include "mapping/size_estimate.h"
+#include "mapping/surface_color.h"
 #include "mapping/touch_update.h"
 
 namespace felt::apps {
@@ -144,7 +145,9 @@ void write_results(const Map& map, const std::function<void()>& save, const fs::
   std::exception_ptr mesh_failure;
   try {
     const auto start = Clock::now();
-    const TriangleMesh mesh = extract_mesh(map);
+    std::vector<VertexEdge> edges;
+    TriangleMesh mesh = extract_mesh(map, {}, &edges);
+    if (!map.properties.empty()) attach_beliefs(map, edges, mesh);
     write_ply(folder / kMeshName, mesh);
     report.mesh_vertices = mesh.positions.size();
     report.mesh_triangles = mesh.triangles.size();
@@ -219,6 +222,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   options.fusion.labels.likelihood = classes.likelihood.get();
   IntegrationScratch scratch;
   bool complete = false;
+  std::string touches_done;  // what became of the recorded touches, JSON; empty until they are applied
   if (options.resume)
     if (auto earlier = resume(options.out / kMapName, source.recording, config)) {
       map = std::move(earlier->map);
@@ -226,9 +230,10 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
       scratch.viewpoints.set_seen(std::move(earlier->viewpoints));
       report.resumed_after = report.fusion.read;
       complete = earlier->complete;
+      touches_done = std::move(earlier->touches);
     }
   const auto save = [&] {
-    save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, source.recording, config,
+    save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, touches_done, source.recording, config,
                     options.out / kMapName);
   };
   fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save, map, scratch,
@@ -244,6 +249,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
     touched = apply_touches(map, touches);
     report.touch_s = seconds_since(start_touch);
     complete = true;
+    if (!touches.file.empty()) touches_done = touches_json(touches, touched).dump();
   }
   write_results(map, save, options.out, common.thread_count(), report);
   report.voxel_size_m = options.voxel_size_m, report.truncation_m = options.truncation_m;
@@ -259,7 +265,9 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   report.peak_rss_bytes = peak_resident_bytes();
   report.total_s = seconds_since(start);
   nlohmann::ordered_json document = to_json(report, config);
-  if (!touches.file.empty()) document["touches"] = touches_json(touches, touched);
+  if (!touches.file.empty())
+    document["touches"] =
+        touches_done.empty() ? touches_json(touches, touched) : nlohmann::ordered_json::parse(touches_done);
   const std::string json = document.dump(2) + "\n";
   write_file_atomically(options.out / kReportName, json);
 

@@ -161,6 +161,7 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   choose(fusion.max_depth_m, a.max_depth_m, file.max_depth_m);
   choose(fusion.max_weight, a.max_weight, file.max_weight);
   choose(fusion.dropoff_start_vox, std::nullopt, file.dropoff_start_vox);
+  choose(fusion.color_band_vox, std::nullopt, file.color_band_vox);
   fusion.distance = a.distance.value_or(file.distance.value_or(fusion.distance));
   fusion.weight = a.weight.value_or(file.weight.value_or(fusion.weight));
   fusion.carve = a.carve || file.carve.value_or(fusion.carve);
@@ -220,6 +221,7 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   json["weight"] = name_of(kWeights, fusion.weight);
   json["max_weight"] = short_decimal(fusion.max_weight);
   json["dropoff_start_vox"] = short_decimal(fusion.dropoff_start_vox);
+  json["color_band_vox"] = short_decimal(fusion.color_band_vox);
   json["carve"] = fusion.carve;
   add_to_json(options.labels, fusion.labels, json);
   return json;

@@ -39,6 +39,7 @@ int run_region(const RegionCommandOptions& options) {
                       {"distance_m", contact.distance_m},
                       {"normal", point_json(contact.normal)}};
     out["rule"] = rule_name(settings.rule);
+    if (settings.rule == RegionRule::connected) out["normal_limit_deg"] = normal_limit_deg(map, contact, settings);
     out["belief"] = belief_json(map, belief, options.below);
     std::printf("%s\n", out.dump(2).c_str());
     return kDone;

@@ -13,6 +13,15 @@ pkg_check_modules(TURBOJPEG REQUIRED IMPORTED_TARGET libturbojpeg)
 pkg_check_modules(BLOSC REQUIRED IMPORTED_TARGET blosc)
 pkg_check_modules(DEFLATE REQUIRED IMPORTED_TARGET libdeflate)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
+pkg_check_modules(TIFF REQUIRED IMPORTED_TARGET libtiff-4>=4.5)
+# OpenEXR's C library alone: it needs zlib and nothing else.
+find_library(FELTMAP_OPENEXR_CORE OpenEXRCore REQUIRED)
+find_path(FELTMAP_OPENEXR_INCLUDE OpenEXR/openexr.h REQUIRED)
+if(NOT TARGET felt_openexr)
+  add_library(felt_openexr INTERFACE IMPORTED)
+  target_include_directories(felt_openexr SYSTEM INTERFACE "${FELTMAP_OPENEXR_INCLUDE}")
+  target_link_libraries(felt_openexr INTERFACE "${FELTMAP_OPENEXR_CORE}")
+endif()
 
 # OpenVDB ships a find module instead of a config file.
 if(NOT TARGET OpenVDB::openvdb)

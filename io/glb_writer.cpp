@@ -41,6 +41,29 @@ struct Buffers {
   }
 };
 
+/// "friction_mean" as glTF wants names of its own: "_FRICTION_MEAN".
+std::string attribute_name(const std::string& scalar) {
+  std::string name = "_";
+  for (const char c : scalar) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    name += !plain ? '_' : c >= 'a' && c <= 'z' ? char(c - 'a' + 'A') : c;
+  }
+  return name;
+}
+
+/// One number per vertex. glTF allows only finite ones: others are written as 0, and an attribute more says where.
+void add_scalars(const std::string& name, std::vector<float> values, Buffers& buffers, json& attributes) {
+  std::vector<float> known(values.size(), 1.0f);
+  bool all_known = true;
+  for (size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i])) values[i] = known[i] = 0, all_known = false;
+  const auto add = [&](const std::vector<float>& v) {
+    return buffers.add(v.data(), v.size() * 4, v.size(), kFloat, "SCALAR", kArrayBuffer);
+  };
+  attributes[name] = add(values);
+  if (!all_known) attributes[name + "_KNOWN"] = add(known);
+}
+
 json primitive_of(const TriangleMesh& mesh, Buffers& buffers) {
   const size_t n = mesh.positions.size();
   json attributes;
@@ -66,6 +89,9 @@ json primitive_of(const TriangleMesh& mesh, Buffers& buffers) {
     buffers.accessors[accessor]["normalized"] = true;
     attributes["COLOR_0"] = accessor;
   }
+  if (!mesh.labels.empty())
+    add_scalars("_LABEL", std::vector<float>(mesh.labels.begin(), mesh.labels.end()), buffers, attributes);
+  for (const MeshScalars& s : mesh.scalars) add_scalars(attribute_name(s.name), s.values, buffers, attributes);
   json primitive = {
       {"attributes", attributes}, {"mode", mesh.triangles.empty() ? kPoints : kTriangles}, {"material", 0}};
   if (!mesh.triangles.empty())

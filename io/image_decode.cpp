@@ -6,7 +6,10 @@
 #include <cstring>
 #include <memory>
 
+#include "io/exr_decode.h"
+#include "io/npy_decode.h"
 #include "io/png_decode.h"
+#include "io/tiff_decode.h"
 
 namespace felt {
 namespace {
@@ -158,10 +161,17 @@ ImageHeader read_image_header(std::span<const uint8_t> file, const std::string& 
     header = png_header(file, where);
   else if (is_jpeg(file))
     header = jpeg_header(file, where);
+  else if (is_tiff(file))
+    header = tiff_header(file, where);
+  else if (is_exr(file))
+    header = exr_header(file, where);
+  else if (is_npy(file))
+    header = npy_header(file, where);
   else if (file.size() < 8)
     throw truncated(where, file);
   else
-    throw ImageError("unknown format", describe_mismatch(where, "image", "PNG or JPEG", "neither signature"));
+    throw ImageError("unknown format",
+                     describe_mismatch(where, "image", "PNG, JPEG, TIFF, EXR or NPY", "none of their signatures"));
   if (int64_t(header.width) * header.height > kMaxImagePixels)
     throw ImageError("too large",
                      describe_mismatch(where, "image size", "at most " + std::to_string(kMaxImagePixels) + " pixels",
@@ -203,6 +213,8 @@ Image<uint16_t> decode_u16_values(std::span<const uint8_t> bytes, bool compresse
 
 ColorImage decode_color(std::span<const uint8_t> file, const std::string& where) {
   const ImageHeader header = read_image_header(file, where);
+  if (header.format != ImageFormat::png && header.format != ImageFormat::jpeg)
+    throw wrong_type(where, "colour as PNG or JPEG", header);
   check_size_is_plausible(header, file, where);
   if (header.format == ImageFormat::jpeg) return jpeg_decode(file, header, where);
   ColorImage image(header.width, header.height);

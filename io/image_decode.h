@@ -24,13 +24,14 @@ private:
 /// allocate gigabytes. 2^26 pixels are 8192 x 8192.
 inline constexpr int64_t kMaxImagePixels = int64_t(1) << 26;
 
-enum class ImageFormat { png, jpeg };
+enum class ImageFormat { png, jpeg, tiff, exr, npy };
 
 struct ImageHeader {
   ImageFormat format = ImageFormat::png;
   int width = 0, height = 0;  ///< pixels
   int channels = 0;           ///< as stored; a palette counts as one
   int bits = 0;               ///< per channel
+  bool floating = false;      ///< values are floating-point numbers
 };
 
 /// Reads format and size from the first bytes of a file (for JPEG the frame header has to be among them).

@@ -21,6 +21,6 @@ struct Layout {
 std::span<const Layout> all_layouts();
 
 extern const Layout kSevenScenesLayout, kTumLayout, kReplicaLayout, kGenericLayout, kRedwoodLayout, kScanNetLayout,
-    kSensLayout, kIclLayout, kApcLayout, kLidarLayout;
+    kSensLayout, kIclLayout, kSceneNetLayout, kApcLayout, kLidarLayout;
 
 }  // namespace felt

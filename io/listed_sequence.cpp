@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "io/camera_file.h"
+#include "io/depth_decode.h"
 #include "io/image_decode.h"
 #include "io/lidar_scan.h"
 #include "io/probability_images.h"
@@ -19,6 +20,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr size_t kImageFileLimitBytes = size_t(1) << 28;
+/// No sensor sees as far; what floating-point depth holds beyond it means nothing measured.
+constexpr float kFarthestMetres = 10000;
 
 /// Thrown within `read` only: the frame becomes a SkippedFrame.
 struct Skip {
@@ -75,10 +78,13 @@ private:
   void find_camera(const fs::path& path);
   Eigen::Isometry3d read_pose(const FrameRecord& frame) const;
   DepthImage read_depth(const ImageSource& source) const;
+  template <typename Stored>
+  DepthImage metres_of(const Image<Stored>& stored, const ImageSource& source) const;
   ColorImage read_color(const ImageSource& source, const DepthImage& depth_m) const;
   Image<uint16_t> read_ids(const ImageSource& source, const std::string& kind, const DepthImage& depth_m) const;
   LabelImage read_labels(const ImageSource& source, const DepthImage& depth_m) const;
   Image<uint16_t> read_masks(const std::vector<ImageSource>& masks, const DepthImage& depth_m) const;
+  Image<uint16_t> read_probability_planes(const ImageSource& source, float& scale) const;
   ProbabilityImage read_probabilities(const ImageSource& source, const LabelImage& labels) const;
   ProbabilityImage read_class_maps(const FrameRecord& frame) const;
   PinholeCamera camera_of_color_grid(int width, int height) const;
@@ -199,6 +205,28 @@ Eigen::Isometry3d ListedSequence::read_pose(const FrameRecord& frame) const {
   return camera_pose(std::get<Eigen::Isometry3d>(recorded), listing_.pose_convention, listing_.T_body_camera);
 }
 
+template <typename Stored>
+DepthImage ListedSequence::metres_of(const Image<Stored>& stored, const ImageSource& source) const {
+  if (stored.width() != info_.camera.width || stored.height() != info_.camera.height)
+    throw Skip{"wrong-size depth image",
+               describe_mismatch(source.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
+                                 size_text(stored.width(), stored.height()))};
+  DepthImage depth_m(stored.width(), stored.height());
+  const bool rotated = listing_.depth_encoding == DepthEncoding::rotated3;
+  const float scale = float(listing_.depth_scale);
+  for (size_t p = 0; p < stored.size(); ++p) {
+    Stored value = stored.data()[p];
+    if constexpr (std::is_integral_v<Stored>) {
+      if (rotated) value = Stored(value >> 3 | value << 13);
+      if (value != 0 && value != 0xffff) depth_m.data()[p] = float(value) / scale;
+    } else {
+      // Renderers write a huge number where a ray meets nothing; NaN fails both comparisons.
+      if (const float metres = value / scale; metres > 0 && metres < kFarthestMetres) depth_m.data()[p] = metres;
+    }
+  }
+  return depth_m;
+}
+
 DepthImage ListedSequence::read_depth(const ImageSource& source) const {
   if (source.codec == ImageSource::Codec::scan) {
     DepthImage depth_m = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
@@ -208,26 +236,14 @@ DepthImage ListedSequence::read_depth(const ImageSource& source) const {
       throw Skip{"depth all zero", source.path.string()};
     return depth_m;
   }
-  const Image<uint16_t> raw = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
-    if (source.codec == ImageSource::Codec::image_file) return decode_gray16(bytes, where);
-    return decode_u16_values(bytes, source.codec == ImageSource::Codec::zlib_u16, info_.camera.width,
-                             info_.camera.height, where);
+  const StoredDepth stored = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
+    if (source.codec == ImageSource::Codec::image_file) return decode_depth(bytes, where);
+    return StoredDepth(decode_u16_values(bytes, source.codec == ImageSource::Codec::zlib_u16, info_.camera.width,
+                                         info_.camera.height, where));
   });
-  if (raw.width() != info_.camera.width || raw.height() != info_.camera.height)
-    throw Skip{"wrong-size depth image",
-               describe_mismatch(source.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
-                                 size_text(raw.width(), raw.height()))};
-  DepthImage depth_m(raw.width(), raw.height());
-  const bool rotated = listing_.depth_encoding == DepthEncoding::rotated3;
-  const float scale = float(listing_.depth_scale);
-  uint32_t any = 0;
-  for (size_t p = 0; p < raw.size(); ++p) {
-    const uint16_t stored = raw.data()[p], value = rotated ? uint16_t(stored >> 3 | stored << 13) : stored;
-    const bool valid = value != 0 && value != 0xffff;
-    any |= valid;
-    depth_m.data()[p] = valid ? float(value) / scale : 0.0f;
-  }
-  if (!any) throw Skip{"depth all zero", source.path.string()};
+  DepthImage depth_m = std::visit([&](const auto& image) { return metres_of(image, source); }, stored);
+  if (std::none_of(depth_m.begin(), depth_m.end(), [](float depth) { return depth > 0; }))
+    throw Skip{"depth all zero", source.path.string()};
   if (!undistortion_.empty()) depth_m = undistorted(depth_m, undistortion_, 0.0f);
   for (size_t p = 0; p < z_per_ray_length_.size(); ++p) depth_m.data()[p] *= z_per_ray_length_.data()[p];
   return depth_m;
@@ -315,14 +331,29 @@ float full_scale(std::span<const uint8_t> bytes, const std::string& where) {
   return read_image_header(bytes, where).bits > 8 ? 65535.0f : 255.0f;
 }
 
-ProbabilityImage ListedSequence::read_probabilities(const ImageSource& source, const LabelImage& labels) const {
-  const int width = info_.camera.width, height = info_.camera.height;
-  float scale = 1;
-  const Image<uint16_t> stack =
+Image<uint16_t> ListedSequence::read_probability_planes(const ImageSource& source, float& scale) const {
+  Image<uint16_t> planes =
       decoded(source, "probability", [&](std::span<const uint8_t> bytes, const std::string& where) {
         scale = full_scale(bytes, where);
         return decode_gray16(bytes, where);
       });
+  const int width = info_.camera.width, height = info_.camera.height;
+  if (undistortion_.empty() || planes.width() != width || planes.height() % height != 0) return planes;
+  // Every plane came through the depth camera's lens, as labels do; what it did not see has no probability.
+  Image<uint16_t> straight(width, planes.height());
+  for (int top = 0; top < planes.height(); top += height) {
+    uint16_t* const to = straight.row(top);
+    const uint16_t* const from = planes.row(top);
+    for (size_t p = 0; p < undistortion_.size(); ++p)
+      if (const int32_t pixel = undistortion_.data()[p]; pixel >= 0) to[p] = from[pixel];
+  }
+  return straight;
+}
+
+ProbabilityImage ListedSequence::read_probabilities(const ImageSource& source, const LabelImage& labels) const {
+  const int width = info_.camera.width, height = info_.camera.height;
+  float scale = 1;
+  const Image<uint16_t> stack = read_probability_planes(source, scale);
   if (stack.width() == width && stack.height() == height && !labels.empty())
     return probabilities_of_confidence(labels, stack, scale);
   if (stack.width() != width || stack.height() % (2 * height) != 0)
@@ -338,11 +369,7 @@ ProbabilityImage ListedSequence::read_class_maps(const FrameRecord& frame) const
   std::vector<DecodedClassMap> maps;
   for (const ClassMap& map : frame.class_maps) {
     float scale = 1;
-    Image<uint16_t> values =
-        decoded(map.image, "probability", [&](std::span<const uint8_t> bytes, const std::string& where) {
-          scale = full_scale(bytes, where);
-          return decode_gray16(bytes, where);
-        });
+    Image<uint16_t> values = read_probability_planes(map.image, scale);
     if (values.width() != info_.camera.width || values.height() != info_.camera.height)
       throw Skip{"wrong-size probability image",
                  describe_mismatch(map.image.path.string(), "size", size_text(info_.camera.width, info_.camera.height),

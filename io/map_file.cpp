@@ -11,8 +11,8 @@
 #include "io/map_metadata.h"
 #include "io/map_trailer.h"
 #include "io/opened_file.h"
-#include "io/vdb_file.h"
 #include "io/vdb_reader.h"
+#include "io/vdb_writer.h"
 #include "mapping/touch_update.h"
 #include "mapping/vdb_state.h"
 #include "mapping/vdb_touch.h"
@@ -126,6 +126,13 @@ void load_instances(const VdbReader& file, const std::string& where, Map& map) {
   require_leaves(leaves, instances, "instance_votes", where);
 }
 
+VdbCodec codec_of(MapCompression compression, bool noisy) {
+  if (compression == MapCompression::fast) return noisy ? VdbCodec::none : VdbCodec::blosc;
+  return compression == MapCompression::blosc ? VdbCodec::blosc
+         : compression == MapCompression::zip ? VdbCodec::zip
+                                              : VdbCodec::none;
+}
+
 Map read_map(const fs::path& path, uint64_t bytes) {
   const std::string where = path.string();
   const OpenedFile opened(path);
@@ -157,14 +164,13 @@ Map read_map(const fs::path& path, uint64_t bytes) {
 }  // namespace
 
 void save_map(const Map& map, const fs::path& path, const SaveOptions& options) {
-  openvdb::initialize();
-  VdbFile file(path);
-  const std::vector<MapGrid> grids = options.views ? map_grids(map) : state_grids(map);
+  MapTrailer trailer;
+  VdbWriter file(path, &trailer);
+  const std::vector<LeafGrid> grids = options.views ? map_grids(map) : state_grids(map);
   const std::string hash = map_hash(map);
   file.begin(to_metadata(map, hash), grids.size(), hash);
-  for (const MapGrid& grid : grids) file.write(*grid.make(), options.compression, grid.noisy);
-  file.flush();
-  file.commit(make_map_trailer(file.written(), kMapFileVersion));
+  for (const LeafGrid& grid : grids) file.write(grid, codec_of(options.compression, grid.noisy));
+  file.commit(trailer.finish(kMapFileVersion));
 }
 
 Map load_map(const fs::path& path) { return read_map(path, verify_map_trailer(path, kMapFileVersion)); }

@@ -26,7 +26,8 @@ struct SaveOptions {
 };
 
 /// Writes the map so that `path` holds either what it held before or the whole new map, also through a crash or a full
-/// disk. Memory: one grid at a time. The same map gives the same bytes. Throws IoError.
+/// disk. Memory: less than 100 MiB and a thirtieth of the planes, whatever the map. The same map gives the same bytes.
+/// Throws IoError.
 void save_map(const Map& map, const std::filesystem::path& path, const SaveOptions& options = {});
 
 /// Reads a map whose `map_hash` is that of the map that was saved, and which goes on as that one would have. The

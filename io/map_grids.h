@@ -1,29 +1,19 @@
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <vector>
 
-#include "mapping/map.h"
+#include "mapping/leaf_grid.h"
 
 namespace felt {
 
-/// A grid of a map file, made when it is asked for.
-struct MapGrid {
-  std::string name;
-  std::function<openvdb::GridBase::Ptr()> make;
-  bool noisy = false;  ///< values that compression hardly shortens: distances, weights, colours
-};
-
 /// The grids of a map file in the order in which the file holds them (docs/file_format.md): what a map is loaded from,
-/// then what follows from it. `map` must outlive the result and stay as it is. What is large is made by `make` only, so
-/// that the file's size does not decide about memory.
-std::vector<MapGrid> state_grids(const Map& map);
-std::vector<MapGrid> view_grids(const Map& map);
-std::vector<MapGrid> map_grids(const Map& map);  ///< both
+/// then what follows from it. `map` must outlive the result and stay as it is. Their values are made when they are
+/// asked for, so that the file's size does not decide about memory.
+std::vector<LeafGrid> state_grids(const Map& map);
+std::vector<LeafGrid> view_grids(const Map& map);
+std::vector<LeafGrid> map_grids(const Map& map);  ///< both
 
 /// Which grids of a map to write for viewing, and how.
 struct VdbExport {

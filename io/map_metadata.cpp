@@ -66,15 +66,21 @@ json frames_to_json(const std::vector<int64_t>& frames) {
   return triples;
 }
 
-std::vector<int64_t> frames_from_json(const json& triples) {
-  std::vector<int64_t> frames;
+/// `left`: how many more frames the whole journal may name.
+std::vector<int64_t> frames_from_json(const json& triples, int64_t& left) {
+  const auto number = [](const json& triple, size_t i) { return triple.at(i).get<int64_t>(); };
+  const int64_t before = left;
   for (const json& triple : triples) {
-    const auto first = triple.at(0).get<int64_t>(), step = triple.at(1).get<int64_t>(),
-               count = triple.at(2).get<int64_t>();
-    if (count < 0 || count + int64_t(frames.size()) > kMostFrames || std::abs(first) > INT32_MAX ||
-        std::abs(step) > INT32_MAX)
-      throw FormatError("frame numbers out of range");
-    frames.reserve(frames.size() + size_t(count));
+    const int64_t count = number(triple, 2);
+    if (count < 0 || count > left) throw FormatError("more than " + std::to_string(kMostFrames) + " frames");
+    left -= count;
+  }
+  std::vector<int64_t> frames;
+  frames.reserve(size_t(before - left));
+  for (const json& triple : triples) {
+    const int64_t first = number(triple, 0), step = number(triple, 1), count = number(triple, 2);
+    for (const int64_t n : {first, step})
+      if (n < -INT32_MAX || n > INT32_MAX) throw FormatError("frame numbers out of range");
     for (int64_t i = 0; i < count; ++i) frames.push_back(first + i * step);
   }
   return frames;
@@ -89,9 +95,10 @@ json journal_to_json(const FrameJournal& journal) {
 
 FrameJournal journal_from_json(const json& runs) {
   FrameJournal journal;
+  int64_t left = kMostFrames;
   for (const json& run : runs)
     journal.runs.push_back({run.at("sequence").get<std::string>(), run.at("settings").get<std::string>(),
-                            frames_from_json(run.at("frames"))});
+                            frames_from_json(run.at("frames"), left)});
   return journal;
 }
 

@@ -6,7 +6,9 @@
 #include <bit>
 #include <cstring>
 #include <memory>
+#include <new>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/error.h"
@@ -19,37 +21,43 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "OpenVDB writes native integers; so does the trailer");
 
 constexpr char kMagic[] = "feltmap trailer\n";  // 16 characters
-constexpr size_t kDigestBytes = sizeof(XXH128_canonical_t), kHeadBytes = kMapTrailerBytes - kDigestBytes;
+constexpr size_t kDigestBytes = sizeof(XXH128_canonical_t);
 static_assert(sizeof kMagic - 1 == 16);
-
-/// Digest of the first `bytes` of the file followed by `tail`.
-XXH128_canonical_t digest(const OpenedFile& file, uint64_t bytes, const char* tail, size_t tail_bytes) {
-  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
-  XXH3_128bits_reset(state.get());
-  std::vector<char> buffer(1 << 20);
-  for (uint64_t at = 0; at < bytes;) {
-    const size_t n = size_t(std::min<uint64_t>(buffer.size(), bytes - at));
-    file.read(buffer.data(), n, at);
-    XXH3_128bits_update(state.get(), buffer.data(), n);
-    at += n;
-  }
-  XXH3_128bits_update(state.get(), tail, tail_bytes);
-  XXH128_canonical_t result;
-  XXH128_canonicalFromHash(&result, XXH3_128bits_digest(state.get()));
-  return result;
-}
 
 }  // namespace
 
-std::string make_map_trailer(const fs::path& path, uint32_t version) {
-  const OpenedFile file(path);
-  const uint64_t payload = file.size();
+struct MapTrailer::State {
+  State() {
+    if (hash == nullptr) throw std::bad_alloc();
+    XXH3_128bits_reset(hash.get());
+  }
+  XXH128_canonical_t digest() const {
+    XXH128_canonical_t result;
+    XXH128_canonicalFromHash(&result, XXH3_128bits_digest(hash.get()));
+    return result;
+  }
+
+  std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> hash{XXH3_createState(), &XXH3_freeState};
+  uint64_t bytes = 0;
+};
+
+MapTrailer::MapTrailer() : state_(std::make_unique<State>()) {}
+MapTrailer::~MapTrailer() = default;
+
+void MapTrailer::add(const void* data, size_t bytes) {
+  XXH3_128bits_update(state_->hash.get(), data, bytes);
+  state_->bytes += bytes;
+}
+
+std::string MapTrailer::finish(uint32_t version) {
+  const uint64_t payload = state_->bytes;
   const uint32_t zero = 0;
   std::string trailer(kMagic, 16);
   trailer.append(reinterpret_cast<const char*>(&version), sizeof version);
   trailer.append(reinterpret_cast<const char*>(&zero), sizeof zero);
   trailer.append(reinterpret_cast<const char*>(&payload), sizeof payload);
-  const XXH128_canonical_t sum = digest(file, payload, trailer.data(), trailer.size());
+  add(trailer.data(), trailer.size());
+  const XXH128_canonical_t sum = state_->digest();
   trailer.append(reinterpret_cast<const char*>(sum.digest), kDigestBytes);
   return trailer;
 }
@@ -76,8 +84,15 @@ uint64_t verify_map_trailer(const fs::path& path, uint32_t known_version) {
   if (stated != payload)
     throw FormatError(describe_mismatch(where, "size", std::to_string(stated) + " bytes before the trailer",
                                         std::to_string(payload)));
-  const XXH128_canonical_t sum = digest(file, payload, trailer, kHeadBytes);
-  if (std::memcmp(sum.digest, trailer + kHeadBytes, kDigestBytes) != 0)
+  MapTrailer found;
+  std::vector<char> buffer(size_t(1) << 20);
+  for (uint64_t at = 0; at < payload;) {
+    const size_t n = size_t(std::min<uint64_t>(buffer.size(), payload - at));
+    file.read(buffer.data(), n, at);
+    found.add(buffer.data(), n);
+    at += n;
+  }
+  if (found.finish(version) != std::string_view(trailer, sizeof trailer))
     throw FormatError(describe_mismatch(where, "checksum", "the one in the trailer",
                                         "another: the file was changed or damaged after it was written"));
   return payload;

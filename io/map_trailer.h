@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 
 namespace felt {
@@ -10,8 +11,23 @@ namespace felt {
 /// the trailer (u64), and XXH3-128 of everything before it (16 bytes, canonical order). Integers are little-endian.
 inline constexpr size_t kMapTrailerBytes = 48;
 
-/// Hashes what was written to `path` so far and returns the trailer to append. Throws IoError.
-std::string make_map_trailer(const std::filesystem::path& path, uint32_t version);
+/// Gathers the checksum while a map file is written.
+class MapTrailer {
+public:
+  MapTrailer();
+  ~MapTrailer();
+  MapTrailer(const MapTrailer&) = delete;
+  MapTrailer& operator=(const MapTrailer&) = delete;
+
+  /// The next bytes of the file.
+  void add(const void* data, size_t bytes);
+  /// The trailer to append behind all of them. Once, at the end.
+  std::string finish(uint32_t version);
+
+private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 /// Checks magic, version, length and checksum; returns the number of bytes before the trailer. Nothing of the content
 /// is interpreted. Throws IoError and FormatError, the latter with the first thing that is wrong.

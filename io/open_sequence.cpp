@@ -6,12 +6,14 @@
 
 #include "core/error.h"
 #include "io/class_table_file.h"
+#include "io/image_decode.h"
 #include "io/layouts.h"
 #include "io/layouts/file_names.h"
 #include "io/listed_sequence.h"
 #include "io/probability_images.h"
 #include "io/recorded_pose.h"
 #include "io/side_images.h"
+#include "io/text_input.h"
 #include "io/trajectory_file.h"
 
 namespace felt {
@@ -27,13 +29,30 @@ const Layout& layout_named(const std::string& name) {
   throw ConfigError(describe_mismatch("--format", "layout", "one of " + names, "'" + name + "'"));
 }
 
+/// What lies directly in a folder, by ending: "4 files *.bag, 3 folders"; says so where they are recordings of ROS.
+std::string contents_of(const fs::path& path) {
+  if (!fs::is_directory(path)) return "a file '" + path.filename().string() + "'";
+  std::map<std::string, int> kinds;
+  std::error_code fault;
+  bool of_ros = false;
+  for (fs::directory_iterator at(path, fault), end; !fault && at != end; at.increment(fault)) {
+    const std::string ending = at->path().extension().string();
+    of_ros |= ending == ".bag" || ending == ".mcap" || ending == ".db3";
+    ++kinds[at->is_directory(fault) ? "folders" : ending.empty() ? "files without an ending" : "*" + ending];
+  }
+  std::string text;
+  for (const auto& [kind, count] : kinds) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + kind;
+  if (text.empty()) text = "an empty folder";
+  return of_ros ? text + " (ROS recordings are not read: export their images and poses first)" : text;
+}
+
 const Layout& detect_layout(const fs::path& path) {
   std::string looked_for;
   for (const Layout& layout : all_layouts()) {
     if (layout.recognises(path)) return layout;
     looked_for += std::string(looked_for.empty() ? "" : "; ") + layout.name + ": " + layout.looks_for;
   }
-  throw FormatError(describe_mismatch(path.string(), "sequence", looked_for, "none of these"));
+  throw FormatError(describe_mismatch(path.string(), "sequence", looked_for, "none of these but " + contents_of(path)));
 }
 
 SequenceListing list_as_recorded(const fs::path& path, const SequenceOptions& options) {
@@ -105,13 +124,33 @@ void choose_class_table(const SequenceOptions& options, SequenceListing& listing
     }
 }
 
+/// Whether the first depth image that can be read holds floating-point numbers, which are metres unless said otherwise.
+bool holds_floats(const SequenceListing& listing) {
+  for (const FrameRecord& frame : listing.frames) {
+    if (frame.depth.empty()) continue;
+    if (frame.depth.codec != ImageSource::Codec::image_file || frame.depth.path.extension() == ".png") return false;
+    try {
+      const std::string bytes = read_whole_file(frame.depth.path);
+      return read_image_header({reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()},
+                               frame.depth.path.string())
+          .floating;
+    } catch (const Error&) {
+      continue;  // that frame is skipped and counted when it is read
+    }
+  }
+  return false;
+}
+
 void apply_options(const SequenceOptions& options, SequenceListing& listing) {
   if (options.intrinsics) {
     listing.intrinsics = options.intrinsics;
     // The user's word against the camera file's size too; containers of raw values need their own.
     if (listing.frames.front().depth.codec == ImageSource::Codec::image_file) listing.width = listing.height = 0;
   }
-  if (options.depth_scale) listing.depth_scale = *options.depth_scale;
+  if (options.depth_scale)
+    listing.depth_scale = *options.depth_scale;
+  else if (!listing.depth_scale_stated && holds_floats(listing))
+    listing.depth_scale = 1;
   if (options.depth_encoding) listing.depth_encoding = *options.depth_encoding;
   if (options.depth_is_ray_length) listing.depth_is_ray_length = *options.depth_is_ray_length;
   if (options.distortion) listing.distortion = *options.distortion;
@@ -145,8 +184,9 @@ auto with_io_errors(Step step) {
 }  // namespace
 
 std::span<const Layout> all_layouts() {
-  static const Layout layouts[] = {kGenericLayout, kTumLayout,     kReplicaLayout, kApcLayout, kSevenScenesLayout,
-                                   kSensLayout,    kScanNetLayout, kRedwoodLayout, kIclLayout, kLidarLayout};
+  static const Layout layouts[] = {kGenericLayout,     kTumLayout,      kReplicaLayout, kApcLayout,
+                                   kSevenScenesLayout, kSensLayout,     kScanNetLayout, kRedwoodLayout,
+                                   kIclLayout,         kSceneNetLayout, kLidarLayout};
   return layouts;
 }
 

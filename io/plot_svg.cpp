@@ -143,6 +143,44 @@ std::string legend(const Plot& plot, double right, double top) {
   return out;
 }
 
+/// A line of text takes this much, roughly: fonts differ.
+constexpr double kCharacter = 6.2, kTextLine = 12;
+
+struct Box {
+  double left, right, top, bottom;
+  bool overlaps(const Box& o) const { return left < o.right && o.left < right && top < o.bottom && o.top < bottom; }
+};
+
+Box legend_box(const Plot& plot, double right, double top) {
+  size_t longest = 0, lines = 0;
+  for (const PlotSeries& s : plot.series) {
+    longest = std::max(longest, s.name.size());
+    lines += !s.name.empty();
+  }
+  if (lines == 0) return {right, right, top, top};
+  return {right - 26 - kCharacter * double(longest), right, top, top + 4 + kLegendLine * double(lines)};
+}
+
+/// Vertical lines with their labels, each label on the first line from the top where it covers neither the legend nor
+/// another label; on the left of its line where the panel ends on the right.
+std::string markers(const Plot& plot, const Axis& x, double right, double top, double bottom) {
+  std::string out;
+  std::vector<Box> taken{legend_box(plot, right, top)};
+  for (const PlotMarker& m : plot.markers) {
+    if (!x.shows(m.x)) continue;
+    const double at = x.pixel(m.x), width = kCharacter * double(m.label.size());
+    out += line_at(at, top, at, bottom, "stroke=\"#444444\" stroke-dasharray=\"2 3\"");
+    const bool left_of_line = at + 3 + width > right;
+    Box box{left_of_line ? at - 3 - width : at + 3, left_of_line ? at - 3 : at + 3 + width, top, top + kTextLine};
+    while (box.bottom < bottom &&
+           std::any_of(taken.begin(), taken.end(), [&](const Box& other) { return box.overlaps(other); }))
+      box.top += kTextLine, box.bottom += kTextLine;
+    out += text_at(left_of_line ? at - 3 : at + 3, box.top + 10, left_of_line ? "end" : "start", m.label);
+    taken.push_back(box);
+  }
+  return out;
+}
+
 std::string panel(const Plot& plot, double width, double height) {
   const double left = kLeft, right = width - kRight, top = kTop, bottom = height - kBottom;
   Axis x(plot.log_x, left, right), y(plot.log_y, bottom, top);
@@ -166,11 +204,7 @@ std::string panel(const Plot& plot, double width, double height) {
   }
   out += fmt::format("<path d=\"M{:.1f},{:.1f}L{:.1f},{:.1f}L{:.1f},{:.1f}\" fill=\"none\" stroke=\"#444444\"/>\n",
                      left, top, left, bottom, right, bottom);
-  for (const PlotMarker& m : plot.markers) {
-    if (!x.shows(m.x)) continue;
-    out += line_at(x.pixel(m.x), top, x.pixel(m.x), bottom, "stroke=\"#444444\" stroke-dasharray=\"2 3\"");
-    out += text_at(x.pixel(m.x) + 3, top + 10, "start", m.label);
-  }
+  out += markers(plot, x, right, top, bottom);
   for (const PlotSeries& s : plot.series) out += drawn(s, x, y);
   out += legend(plot, right, top);
   out += text_at((left + right) / 2, 18, "middle", plot.title, " font-weight=\"bold\"");

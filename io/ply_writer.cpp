@@ -35,6 +35,13 @@ void put(char*& to, const T& value) {
   to += sizeof value;
 }
 
+/// A name as PLY's header can hold it: without white space.
+std::string one_word(std::string name) {
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) <= ' '; }, '_');
+  return name;
+}
+
 std::string header(const TriangleMesh& mesh, const std::vector<std::string>& comments) {
   std::string text = "ply\nformat binary_little_endian 1.0\n";
   for (const std::string& comment : comments) text += "comment " + comment + "\n";
@@ -43,10 +50,10 @@ std::string header(const TriangleMesh& mesh, const std::vector<std::string>& com
   if (!mesh.normals.empty()) text += "property float nx\nproperty float ny\nproperty float nz\n";
   if (!mesh.colors.empty()) text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   if (!mesh.labels.empty()) text += "property ushort label\n";
-  for (const MeshScalars& s : mesh.scalars) text += "property float " + s.name + "\n";
+  for (const MeshScalars& s : mesh.scalars) text += "property float " + one_word(s.name) + "\n";
   if (!mesh.triangles.empty()) {
     text += "element face " + std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\n";
-    for (const MeshScalars& s : mesh.triangle_scalars) text += "property float " + s.name + "\n";
+    for (const MeshScalars& s : mesh.triangle_scalars) text += "property float " + one_word(s.name) + "\n";
   }
   return text + "end_header\n";
 }

@@ -1,54 +1,31 @@
 #include "io/pose_list.h"
 
-#include <charconv>
-#include <cmath>
-#include <fstream>
-
 #include "core/error.h"
 #include "core/pose.h"
+#include "io/text_input.h"
+#include "io/trajectory_file.h"
 
 namespace felt {
-namespace {
-
-std::vector<double> parse_numbers(std::string_view text, const std::string& where) {
-  std::vector<double> numbers;
-  constexpr const char* kSeparators = " \t\r,";
-  for (size_t at = text.find_first_not_of(kSeparators); at != std::string_view::npos;) {
-    const size_t end = std::min(text.find_first_of(kSeparators, at), text.size());
-    std::string_view word = text.substr(at, end - at);
-    if (word.front() == '+') word.remove_prefix(1);
-    double value = 0;
-    const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || stop != word.data() + word.size())
-      throw FormatError(describe_mismatch(where, "pose", "numbers", std::string(word.substr(0, 40))));
-    numbers.push_back(value);
-    at = text.find_first_not_of(kSeparators, end);
-  }
-  return numbers;
-}
-
-}  // namespace
 
 Eigen::Isometry3d parse_pose(std::string_view text, const std::string& where) {
-  const std::vector<double> all = parse_numbers(text, where);
+  std::vector<double> all;
+  for (const std::string_view word : split_words(text, ',')) {
+    const auto number = parse_number(word);
+    if (!number) throw FormatError(describe_mismatch(where, "pose", "numbers", std::string(word.substr(0, 40))));
+    all.push_back(*number);
+  }
   const bool stamped = all.size() == 8 || all.size() == 13 || all.size() == 17;
   const size_t count = all.size() - (stamped ? 1 : 0);
-  const double* n = all.data() + (stamped ? 1 : 0);
-  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  if (count == 7) {
-    const Eigen::Quaterniond q(n[6], n[3], n[4], n[5]);
-    if (!(std::abs(q.norm() - 1) < 0.01))
-      throw FormatError(describe_mismatch(where, "quaternion", "length 1", std::to_string(q.norm())));
-    matrix.topLeftCorner<3, 3>() = q.normalized().toRotationMatrix();
-    matrix.topRightCorner<3, 1>() << n[0], n[1], n[2];
-  } else if (count == 12 || count == 16) {
-    for (size_t i = 0; i < count; ++i) matrix(Eigen::Index(i / 4), Eigen::Index(i % 4)) = n[i];
-  } else {
+  const double* const numbers = all.data() + (stamped ? 1 : 0);
+  if (count != 7 && count != 12 && count != 16)
     throw FormatError(describe_mismatch(where, "pose", "16, 12 or 7 numbers, with or without a stamp before them",
                                         std::to_string(all.size())));
-  }
+  if (count == 7)
+    if (const double length = Eigen::Map<const Eigen::Vector4d>(numbers + 3).norm(); !(std::abs(length - 1) < 0.01))
+      throw FormatError(describe_mismatch(where, "quaternion", "length 1", std::to_string(length)));
   Eigen::Isometry3d T;
-  const PoseFault fault = rigid_pose(matrix, T);
+  const PoseFault fault =
+      rigid_pose(count == 7 ? matrix_of_translation_quaternion(numbers) : matrix_of_numbers(numbers, count), T);
   if (fault != PoseFault::none)
     throw FormatError(
         describe_mismatch(where, "pose", "a rigid transform",
@@ -57,16 +34,9 @@ Eigen::Isometry3d parse_pose(std::string_view text, const std::string& where) {
 }
 
 std::vector<Eigen::Isometry3d> read_poses(const std::filesystem::path& path) {
-  std::ifstream in(path);
-  if (!in) throw IoError(path.string() + ": cannot open");
+  const std::string content = read_whole_file(path);
   std::vector<Eigen::Isometry3d> poses;
-  int number = 0;
-  for (std::string line; std::getline(in, line);) {
-    ++number;
-    const size_t start = line.find_first_not_of(" \t\r");
-    if (start == std::string::npos || line[start] == '#') continue;
-    poses.push_back(parse_pose(line, path.string() + ":" + std::to_string(number)));
-  }
+  for (LineReader lines(content, path); lines.next();) poses.push_back(parse_pose(lines.line(), lines.where()));
   if (poses.empty()) throw FormatError(describe_mismatch(path.string(), "trajectory", "poses", "none"));
   return poses;
 }

@@ -129,6 +129,7 @@ std::map<std::string, ReadValue> readers_of(ReconstructConfig& c, const fs::path
       {"max_depth", number_into(c.max_depth_m, 0, false)},
       {"max_weight", number_into(c.max_weight, 1, true)},
       {"dropoff_start", number_into(c.dropoff_start_vox, 0, true)},
+      {"color_band", number_into(c.color_band_vox, 0, true)},
       {"distance", choice_into<DistanceModel>(c.distance, {{"optical-axis", DistanceModel::optical_axis},
                                                            {"ray", DistanceModel::ray},
                                                            {"tangent-plane", DistanceModel::tangent_plane}})},

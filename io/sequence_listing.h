@@ -53,6 +53,7 @@ struct SequenceListing {
   Distortion distortion, color_distortion;     ///< of each camera's lens
   Eigen::Matrix4d T_color_depth = Eigen::Matrix4d::Identity();
   double depth_scale = 1000;
+  bool depth_scale_stated = false;  ///< by the sequence; else floating-point depth counts metres
   DepthEncoding depth_encoding = DepthEncoding::plain;
   bool depth_is_ray_length = false;
   PoseConvention pose_convention;

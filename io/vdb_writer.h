@@ -1,34 +1,48 @@
 #pragma once
 
-#include <openvdb/io/Archive.h>
-#include <openvdb/io/io.h>
-#include <openvdb/openvdb.h>
+#include <openvdb/MetaMap.h>
 
-#include <iosfwd>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
 #include <string>
+
+#include "mapping/leaf_grid.h"
 
 namespace felt {
 
-/// Writes an OpenVDB file grid by grid, so that no more than one grid needs to be in memory: io::File and io::Stream
-/// take all of them at once. The result has grid offsets like that of io::File. Same grids, same bytes: the random
-/// identifier that OpenVDB puts into a file's header is replaced by one that follows from `seed`.
-class VdbWriter : private openvdb::io::Archive {
+class MapTrailer;
+
+/// How a file stores values; every stock reader that is built with the library named reads them.
+enum class VdbCodec {
+  none,   ///< values of active voxels as they are
+  blosc,  ///< LZ4 with byte shuffling
+  zip     ///< DEFLATE
+};
+
+/// Writes an OpenVDB file (version 224, with grid offsets) that appears whole or not at all, from descriptions of grids
+/// and without their trees. Memory: a leaf for each thread, 64 bytes for each leaf of a grid, and at most 64 MiB of
+/// what is compressed. The bytes follow from the arguments and not from the number of threads: the random identifier of
+/// a file is replaced by one that follows from `seed`. Every member throws IoError.
+class VdbWriter {
 public:
-  /// `os` is seekable and at its beginning. `grids` is the number of `write` calls that follow.
-  VdbWriter(std::ostream& os, const openvdb::MetaMap& metadata, int32_t grids, const std::string& seed);
-  ~VdbWriter() override;
+  /// Nothing can be written yet, but a place that cannot be written to shows here. `trailer`, if any, is given every
+  /// byte of the file.
+  explicit VdbWriter(const std::filesystem::path& path, MapTrailer* trailer = nullptr);
+  ~VdbWriter();
   VdbWriter(const VdbWriter&) = delete;
   VdbWriter& operator=(const VdbWriter&) = delete;
 
-  /// `compression` is a combination of openvdb::io's flags. Grid names must be distinct. Float grids with
-  /// `saveFloatAsHalf` are stored in 16 bits. Adds the usual statistics (file_bbox_min, file_voxel_count, ...) to the
-  /// grid's metadata.
-  void write(openvdb::GridBase& grid, uint32_t compression);
+  /// `grids`: the number of `write` calls that follow.
+  void begin(const openvdb::MetaMap& metadata, size_t grids, const std::string& seed);
+  /// Names must be distinct. `in_16_bits`: floats in 16 bits.
+  void write(const LeafGrid& grid, VdbCodec codec, bool in_16_bits = false);
+  /// Appends bytes that OpenVDB does not read, and puts the file in its place.
+  void commit(const std::string& tail = "");
 
 private:
-  std::ostream& os_;
-  /// The stream refers to this object, not to what it points at: it has to live as long as the writer.
-  openvdb::io::StreamMetadata::Ptr stream_metadata_ = std::make_shared<openvdb::io::StreamMetadata>();
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace felt

@@ -1,5 +1,7 @@
 #include "mapping/block_store.h"
 
+#include <sys/mman.h>
+
 #include <algorithm>
 #include <cstring>
 #include <mutex>
@@ -10,6 +12,16 @@ namespace felt {
 struct BlockStore::Guard {
   std::mutex mutex;
 };
+
+void BlockStore::populate(void* chunk, size_t bytes) {
+#ifdef MADV_POPULATE_WRITE
+  // Where the kernel does not know the advice, pages come as they are written.
+  constexpr uintptr_t kPage = 4096;
+  const auto begin = reinterpret_cast<uintptr_t>(chunk) & ~(kPage - 1);
+  const auto end = (reinterpret_cast<uintptr_t>(chunk) + bytes) & ~(kPage - 1);
+  if (end > begin) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_POPULATE_WRITE);
+#endif
+}
 
 bool GeometryPlanes::observed() const {
   return std::any_of(std::begin(weight), std::end(weight), [](float w) { return w > 0; });

@@ -7,12 +7,13 @@ namespace felt {
 namespace {
 
 /// Most probable class, its probability and the entropy of `alpha`.
-ClassBelief belief_of(std::span<const double> alpha) {
+ClassBelief belief_of(std::span<const double> alpha, bool with_entropy) {
   double total = 0;
   for (const double a : alpha) total += a;
   const auto most = std::max_element(alpha.begin(), alpha.end());
   double entropy = 0;
-  for (const double a : alpha) entropy -= a / total * std::log(a / total);
+  if (with_entropy)
+    for (const double a : alpha) entropy -= a / total * std::log(a / total);
   return {uint16_t(most - alpha.begin()), float(*most / total), float(entropy)};
 }
 
@@ -27,7 +28,7 @@ void class_concentration(const Block* block, int offset, const ClassTable& class
   for (const EvidencePlane& plane : block->evidence) alpha[plane.slot] += double(plane.counts->value[offset]);
 }
 
-ClassBelief class_belief(const Block& block, int offset, const ClassTable& classes) {
+ClassBelief class_belief(const Block& block, int offset, const ClassTable& classes, bool with_entropy) {
   const int k = classes.size();
   double most = 0, counts = 0;
   ClassBelief belief;
@@ -40,12 +41,13 @@ ClassBelief class_belief(const Block& block, int offset, const ClassTable& class
   if (!classes.even_prior()) {
     std::vector<double> alpha(static_cast<size_t>(k));
     class_concentration(&block, offset, classes, alpha);
-    return belief_of(alpha);
+    return belief_of(alpha, with_entropy);
   }
   // Classes without a plane all have the same concentration: no vector of k numbers is needed.
   const double even = block.even_evidence != nullptr ? double(block.even_evidence->value[offset]) : 0;
   const double floor = classes.prior(0) + even / k, total = k * floor + counts;
   belief.probability = float((floor + most) / total);
+  if (!with_entropy) return belief;
   double entropy = -double(k - int(block.evidence.size())) * (floor / total) * std::log(floor / total);
   for (const EvidencePlane& plane : block.evidence) {
     const double p = (floor + double(plane.counts->value[offset])) / total;

@@ -20,7 +20,8 @@ struct ClassBelief {
 /// holds the prior.
 void class_concentration(const Block* block, int offset, const ClassTable& classes, std::span<double> alpha);
 
-ClassBelief class_belief(const Block& block, int offset, const ClassTable& classes);
+/// `with_entropy`: otherwise that stays 0, which saves logarithms.
+ClassBelief class_belief(const Block& block, int offset, const ClassTable& classes, bool with_entropy = true);
 
 /// Sum of the evidence of one voxel, without the prior.
 float total_evidence(const Block& block, int offset);

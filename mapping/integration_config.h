@@ -39,13 +39,15 @@ struct LabelConfig {
 struct IntegrationConfig {
   float min_depth_m = 0.1f;  ///< nearer pixels are not used
   float max_depth_m = 4.0f;  ///< farther pixels are not used
-  DistanceModel distance = DistanceModel::optical_axis;
+  DistanceModel distance = DistanceModel::ray;
   WeightModel weight = WeightModel::constant;
   float max_weight = 255.0f;  ///< cap of the summed weight: an old map stays able to change
   /// Behind the surface the weight falls linearly from 1 at this distance (in voxels) to 0 at the truncation.
   float dropoff_start_vox = 1.0f;
   /// Also fuse "free" (+truncation) into observed voxels in front of the band, as far as blocks exist.
   bool carve = false;
+  /// Voxels nearer than this to the surface, in voxels, take colour: those that colour of the mesh is interpolated from.
+  float color_band_vox = 2.0f;
   LabelConfig labels;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/simd.h"
 #include "mapping/class_belief.h"
 #include "mapping/label_evidence.h"
 #include "mapping/label_kernels.h"
@@ -15,24 +16,28 @@ namespace {
 /// block: looking a class up costs the same for any number of classes.
 class BlockPlanes {
 public:
-  BlockPlanes(Block& block, BlockStore& store, int classes) : block_(block), store_(store), by_slot_(table()) {
-    if (by_slot_.size() < size_t(classes)) by_slot_.resize(size_t(classes), nullptr);
+  BlockPlanes(Block& block, BlockStore& store, int classes)
+      : block_(block), store_(store), classes_(classes), by_slot_(table(classes)) {
     for (const EvidencePlane& e : block_.evidence) by_slot_[e.slot] = e.counts;
+    static thread_local Plane unused;
+    by_slot_[classes_] = &unused;
   }
   BlockPlanes(const BlockPlanes&) = delete;
   BlockPlanes& operator=(const BlockPlanes&) = delete;
   ~BlockPlanes() {
     for (const EvidencePlane& e : block_.evidence) by_slot_[e.slot] = nullptr;
+    by_slot_[classes_] = nullptr;
   }
 
-  Plane& of(uint16_t slot) {
-    if (by_slot_[slot] == nullptr) {
-      const auto at = std::lower_bound(block_.evidence.begin(), block_.evidence.end(), slot,
-                                       [](const EvidencePlane& e, uint16_t s) { return e.slot < s; });
-      by_slot_[slot] = block_.evidence.insert(at, {slot, store_.new_plane()})->counts;
-    }
-    return *by_slot_[slot];
+  /// Of a class, or of `nobody`.
+  Plane& of(int slot) {
+    Plane*& plane = by_slot_[slot];
+    if (plane == nullptr) [[unlikely]]
+      plane = create(uint16_t(slot));
+    return *plane;
   }
+  /// A slot whose plane is nobody's: what is added there is lost, without a branch.
+  int nobody() const { return classes_; }
   Plane& even() {
     if (block_.even_evidence == nullptr) block_.even_evidence = store_.new_plane();
     return *block_.even_evidence;
@@ -47,53 +52,56 @@ public:
   }
 
 private:
-  static std::vector<Plane*>& table() {
+  Plane* create(uint16_t slot) {
+    const auto at = std::lower_bound(block_.evidence.begin(), block_.evidence.end(), slot,
+                                     [](const EvidencePlane& e, uint16_t s) { return e.slot < s; });
+    return block_.evidence.insert(at, {slot, store_.new_plane()})->counts;
+  }
+  static Plane** table(int classes) {
     static thread_local std::vector<Plane*> planes;  // all null between blocks
-    return planes;
+    if (planes.size() <= size_t(classes)) planes.resize(size_t(classes) + 1, nullptr);
+    return planes.data();
   }
   Block& block_;
   BlockStore& store_;
-  std::vector<Plane*>& by_slot_;
+  int classes_;
+  Plane** by_slot_;
 };
 
-int first_lane(const LaneBits& lanes, int& row) {
-  while (row < kBlockVoxels / 8 && lanes.row[row] == 0) ++row;
-  return row == kBlockVoxels / 8 ? -1 : row * 8 + __builtin_ctz(lanes.row[row]);
-}
-
-template <typename Visit>
-void for_each_lane(const LaneBits& lanes, Visit visit) {
-  for (int row = 0; row < kBlockVoxels / 8; ++row)
-    for (unsigned bits = lanes.row[row]; bits != 0; bits &= bits - 1) visit(row * 8 + __builtin_ctz(bits));
-}
-
-/// Class by class: neighbouring voxels mostly see one.
-LabelStats fuse_hard(const BlockObservation& observation, const LabelView& view, LaneBits rest, Block& block,
-                     BlockStore& store) {
+LabelStats fuse_hard(const BandVoxels& band, const LabelView& view, Block& block, BlockStore& store) {
   LabelStats stats;
-  BlockPlanes planes(block, store, view.classes->size());
-  alignas(64) int32_t ids[kBlockVoxels];
-  fetch_ids(observation, rest, view.labels->data(), ids);
-  int row = 0;
-  for (int lane = first_lane(rest, row); lane >= 0; lane = first_lane(rest, row)) {
-    LaneBits taken;
-    const auto id = uint16_t(ids[lane]);
-    const int count = take_equal(ids, id, rest, taken);
-    const uint16_t slot = view.classes->slot_of_id(id);
-    if (slot == ClassTable::kNoSlot) {
-      if (id != kNoLabel && !view.classes->known(id)) stats.unknown += uint64_t(count);
-      continue;
-    }
-    stats.voxels += uint64_t(count);
-    if (view.config.max_evidence > 0) fade_evidence(taken, planes.all(), view.evidence, view.config.max_evidence);
-    if (view.config.likelihood == nullptr) {
-      add_evidence(taken, view.evidence, planes.of(slot));
-      continue;
-    }
+  const ClassTable& classes = *view.classes;
+  BlockPlanes planes(block, store, classes.size());
+  const uint16_t* ids = view.labels->data();
+  LaneBits taken = band.bits;
+  alignas(64) int32_t slots[kBlockVoxels];
+  int nothing = 0;
+  for (int i = 0; i < band.count; ++i) {
+    const uint16_t id = ids[uint32_t(band.pixel[i])], slot = classes.slot_of_id(id);
+    slots[i] = slot;
+    if (slot != ClassTable::kNoSlot) continue;
+    slots[i] = planes.nobody();
+    taken.clear(band.lane[i]);
+    ++nothing;
+    stats.unknown += id != kNoLabel && !classes.known(id);
+  }
+  stats.voxels = uint64_t(band.count - nothing);
+  if (view.config.max_evidence > 0) {
+    alignas(64) float added[kBlockVoxels];
+    std::fill_n(added, kBlockVoxels, view.evidence);
+    fade_evidence(taken, planes.all(), added, view.config.max_evidence);
+  }
+  if (view.config.likelihood == nullptr) {
+    for (int i = 0; i < band.count; ++i) planes.of(slots[i]).value[band.lane[i]] += view.evidence;
+    return stats;
+  }
+  for (int i = 0; i < band.count; ++i) {
+    if (slots[i] == planes.nobody()) continue;
+    const auto slot = size_t(slots[i]);
     for (const LabelEvidence::Share& share : view.config.likelihood->shares[slot])
-      add_evidence(taken, view.evidence * share.evidence, planes.of(share.slot));
+      planes.of(share.slot).value[band.lane[i]] += view.evidence * share.evidence;
     if (const float even = view.config.likelihood->even[slot]; even > 0)
-      add_evidence(taken, view.evidence * even, planes.even());
+      planes.even().value[band.lane[i]] += view.evidence * even;
   }
   return stats;
 }
@@ -122,11 +130,8 @@ struct SoftPixel {
       else
         unknown = unknown || (ids[i] != kNoLabel && !classes.known(ids[i]));
     }
-    constexpr float kTooMuch = 1.001f;
-    valid = valid && sum <= kTooMuch;
-    // Rounded to 16 bits, a whole distribution may lack a little; nothing was dropped from it.
-    const float rounding = float(image.top) / 65535.0f;
-    dropped = sum < 1 - rounding ? 1 - sum : 0;
+    valid = valid && sum <= kMostProbability;
+    dropped = sum < 1 - rounded_mass(image.top) ? 1 - sum : 0;
   }
 
   /// Gives the dropped mass to the classes that are not named, evenly: what all share, and less for those named.
@@ -167,49 +172,125 @@ void fade_lane(Block& block, int offset, float added, float max_evidence) {
   for (EvidencePlane& e : block.evidence) e.counts->value[offset] *= keep;
 }
 
-LabelStats fuse_soft(const BlockObservation& observation, const LabelView& view, const LaneBits& band, Block& block,
-                     BlockStore& store) {
-  LabelStats stats;
-  const int k = view.classes->size();
-  BlockPlanes planes(block, store, k);
+/// One voxel, by the rule in plain words.
+void fuse_soft_voxel(int lane, int32_t at, const LabelView& view, BlockPlanes& planes, Block& block,
+                     LabelStats& stats) {
   static thread_local SoftPixel pixel;
   const LabelEvidence* likelihood = view.config.likelihood;
-  for_each_lane(band, [&](int lane) {
-    pixel.read(*view.probabilities, observation.pixel[lane], *view.classes);
-    stats.unknown += pixel.unknown;
-    stats.invalid += !pixel.valid;
-    if (pixel.named.empty() || !pixel.valid) return;
-    ++stats.voxels;
-    float even = 0;
-    if (view.config.spread_dropped && likelihood == nullptr)
-      even = pixel.spread(k);
-    else if (view.config.spread_dropped)
-      even = pixel.dropped;
-    float added = even;
-    for (const LabelEvidence::Share& named : pixel.named) added += named.evidence;
-    if (view.config.max_evidence > 0) fade_lane(block, lane, view.evidence * added, view.config.max_evidence);
-    for (const LabelEvidence::Share& named : pixel.named) {
-      const float evidence = view.evidence * named.evidence;
-      if (likelihood == nullptr) {
-        planes.of(named.slot).value[lane] += evidence;
-        continue;
-      }
-      for (const LabelEvidence::Share& share : likelihood->shares[named.slot])
-        planes.of(share.slot).value[lane] += evidence * share.evidence;
-      even += named.evidence * likelihood->even[named.slot];
+  pixel.read(*view.probabilities, at, *view.classes);
+  stats.unknown += pixel.unknown;
+  stats.invalid += !pixel.valid;
+  if (pixel.named.empty() || !pixel.valid) return;
+  ++stats.voxels;
+  float even = 0;
+  if (view.config.spread_dropped && likelihood == nullptr)
+    even = pixel.spread(view.classes->size());
+  else if (view.config.spread_dropped)
+    even = pixel.dropped;
+  float added = even;
+  for (const LabelEvidence::Share& named : pixel.named) added += named.evidence;
+  if (view.config.max_evidence > 0) fade_lane(block, lane, view.evidence * added, view.config.max_evidence);
+  for (const LabelEvidence::Share& named : pixel.named) {
+    if (likelihood == nullptr) {
+      planes.of(named.slot).value[lane] += view.evidence * named.evidence;
+      continue;
     }
-    if (even > 0) planes.even().value[lane] += view.evidence * even;
-  });
+    const float evidence = view.evidence * named.evidence;
+    for (const LabelEvidence::Share& share : likelihood->shares[named.slot])
+      planes.of(share.slot).value[lane] += evidence * share.evidence;
+    even += named.evidence * likelihood->even[named.slot];
+  }
+  if (even > 0) planes.even().value[lane] += view.evidence * even;
+}
+
+/// Reads the probabilities of the listed pixels. Returns how many name a class that the table does not know.
+uint64_t read_probabilities(const BandVoxels& band, const ProbabilityImage& image, const ClassTable& classes,
+                            int nobody, std::vector<SoftRank>& ranks) {
+  const auto top = size_t(image.top);
+  uint8_t unknown[kBlockVoxels];
+  uint64_t any_unknown = 0;
+  ranks.resize(top);
+  for (size_t r = 0; r < top; ++r)
+    for (int i = 0; i < band.count; ++i) {
+      const size_t at = size_t(uint32_t(band.pixel[i])) * top + r;
+      const uint16_t id = image.class_id[at], slot = classes.slot_of_id(id);
+      ranks[r].amount[i] = image.probability[at];
+      ranks[r].slot[i] = slot;
+      if (slot != ClassTable::kNoSlot) continue;
+      ranks[r].slot[i] = nobody;
+      if (!(image.probability[at] > 0) || id == kNoLabel || classes.known(id)) continue;
+      if (any_unknown++ == 0) std::fill_n(unknown, band.count, uint8_t(0));
+      unknown[i] = 1;
+    }
+  return any_unknown == 0 ? 0 : uint64_t(std::count(unknown, unknown + band.count, uint8_t(1)));
+}
+
+LabelStats fuse_soft(const BandVoxels& band, const LabelView& view, Block& block, BlockStore& store) {
+  LabelStats stats;
+  BlockPlanes planes(block, store, view.classes->size());
+  if (view.config.likelihood != nullptr || simd_scalar_forced()) {
+    for (int i = 0; i < band.count; ++i) fuse_soft_voxel(band.lane[i], band.pixel[i], view, planes, block, stats);
+    return stats;
+  }
+  static thread_local SoftPixels pixels;
+  pixels.count = band.count, pixels.classes = planes.nobody();
+  pixels.evidence = view.evidence, pixels.spread = view.config.spread_dropped;
+  stats.unknown = read_probabilities(band, *view.probabilities, *view.classes, planes.nobody(), pixels.ranks);
+  weigh_probabilities(pixels);
+  stats.voxels = uint64_t(pixels.taken), stats.invalid = uint64_t(pixels.invalid);
+  if (view.config.max_evidence > 0) {
+    alignas(64) float added[kBlockVoxels];
+    LaneBits taken = band.bits;
+    for (int i = 0; i < band.count; ++i) {
+      added[band.lane[i]] = pixels.added[i];
+      if (pixels.verdict[i] != SoftPixels::kAdds) taken.clear(band.lane[i]);
+    }
+    fade_evidence(taken, planes.all(), added, view.config.max_evidence);
+  }
+  bool any_even = false;
+  for (const SoftRank& rank : pixels.ranks)
+    for (int i = 0; i < band.count; ++i) planes.of(rank.slot[i]).value[band.lane[i]] += rank.amount[i];
+  for (int i = 0; i < band.count; ++i) any_even = any_even || pixels.even[i] > 0;
+  if (any_even) {
+    float* even = planes.even().value;
+    for (int i = 0; i < band.count; ++i) even[band.lane[i]] += pixels.even[i];
+  }
+  if (pixels.any_left) {
+    LabelStats left;
+    for (int i = 0; i < band.count; ++i)
+      if (pixels.verdict[i] == SoftPixels::kLeft)
+        fuse_soft_voxel(band.lane[i], band.pixel[i], view, planes, block, left);
+    stats.voxels += left.voxels;
+  }
   return stats;
 }
 
-void fuse_instances(const BlockObservation& observation, const Image<uint16_t>& instances, const LaneBits& band,
-                    Block& block, BlockStore& store) {
-  for_each_lane(band, [&](int lane) {
-    const uint16_t id = instances.data()[observation.pixel[lane]];
-    if (id == 0 || id == kNoLabel) return;
-    vote_instance(store.add_instance(block), lane, id);
-  });
+void fuse_instances(const BandVoxels& band, const Image<uint16_t>& instances, Block& block, BlockStore& store) {
+  for (int i = 0; i < band.count; ++i) {
+    const uint16_t id = instances.data()[uint32_t(band.pixel[i])];
+    if (id != 0 && id != kNoLabel) vote_instance(store.add_instance(block), band.lane[i], id);
+  }
+}
+
+/// Lines of planes and images that `band` will need travel meanwhile.
+void prefetch(const BandVoxels& band, const LabelView& view, const Block& block) {
+  constexpr size_t kMostPlanes = 4;
+  const auto fetch = [&](const Plane* plane) {
+    for (uint32_t rest = band.groups; rest != 0; rest &= rest - 1)  // a group of floats is a cache line
+      __builtin_prefetch(plane->value + __builtin_ctz(rest) * kGroupVoxels, 1, 3);
+  };
+  if (block.even_evidence != nullptr) fetch(block.even_evidence);
+  for (size_t i = 0; i < std::min(kMostPlanes, block.evidence.size()); ++i) fetch(block.evidence[i].counts);
+  if (view.probabilities != nullptr && !view.probabilities->empty()) {
+    const auto top = size_t(view.probabilities->top);
+    for (int i = 0; i < band.count; ++i) {
+      const size_t at = size_t(uint32_t(band.pixel[i])) * top;
+      __builtin_prefetch(view.probabilities->class_id.data() + at, 0, 3);
+      __builtin_prefetch(view.probabilities->probability.data() + at, 0, 3);
+    }
+  } else if (view.says_classes()) {
+    for (int i = 0; i < band.count; ++i) __builtin_prefetch(view.labels->data() + uint32_t(band.pixel[i]), 0, 3);
+  }
 }
 
 template <typename Pixels>
@@ -254,14 +335,32 @@ void vote_instance(InstancePlanes& planes, int offset, uint16_t id) {
     --votes;
 }
 
-LabelStats fuse_labels(const BlockObservation& observation, const LabelView& view, Block& block, BlockStore& store) {
-  LaneBits band;
-  if (!select_band(observation, view.band_m, band)) return {};
-  if (view.says_instances()) fuse_instances(observation, *view.instances, band, block, store);
-  if (!view.says_classes()) return {};
-  return view.probabilities != nullptr && !view.probabilities->empty()
-             ? fuse_soft(observation, view, band, block, store)
-             : fuse_hard(observation, view, band, block, store);
+void LabelFusion::add(const BlockObservation& observation, Block& block) {
+  BandVoxels& band = bands_[current_];
+  select_band(observation, view_.band_m, band);
+  if (band.count == 0) return;
+  prefetch(band, view_, block);
+  current_ = 1 - current_;
+  fuse_waiting();
+  waiting_ = &block;
+}
+
+LabelStats LabelFusion::finish() {
+  current_ = 1 - current_;
+  fuse_waiting();
+  current_ = 1 - current_;
+  return stats_;
+}
+
+void LabelFusion::fuse_waiting() {
+  if (waiting_ == nullptr) return;
+  const BandVoxels& band = bands_[current_];
+  Block& block = *waiting_;
+  waiting_ = nullptr;
+  if (view_.says_instances()) fuse_instances(band, *view_.instances, block, store_);
+  if (!view_.says_classes()) return;
+  stats_ += view_.probabilities != nullptr && !view_.probabilities->empty() ? fuse_soft(band, view_, block, store_)
+                                                                            : fuse_hard(band, view_, block, store_);
 }
 
 }  // namespace felt

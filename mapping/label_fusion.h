@@ -7,7 +7,7 @@
 #include "core/frame.h"
 #include "mapping/block_store.h"
 #include "mapping/integration_config.h"
-#include "mapping/tsdf_kernels.h"
+#include "mapping/label_kernels.h"
 
 namespace felt {
 
@@ -44,7 +44,7 @@ struct LabelStats {
   }
 };
 
-/// Adds the evidence of one frame to the block's Dirichlet planes (INFERENCE: alpha_j += evidence of the pixel's class
+/// Adds the evidence of one frame to the blocks' Dirichlet planes (INFERENCE: alpha_j += evidence of the pixel's class
 /// j), for observed voxels nearer than the label band to the surface: a voxel behind another surface is farther from it
 /// than that and takes nothing. Nothing else of the block is read or written but instance votes.
 ///
@@ -60,8 +60,30 @@ struct LabelStats {
 ///   exponential forgetting, so that a network that was wrong for long can be corrected.
 /// * Where the view has instances, every voxel of the band votes for its pixel's id.
 ///
-/// Creates planes for classes that the block sees for the first time. One task per block; any number of tasks.
-LabelStats fuse_labels(const BlockObservation& observation, const LabelView& view, Block& block, BlockStore& store);
+/// Creates planes for classes that the block sees for the first time. One task per block; any number of tasks, each
+/// with its own LabelFusion. A block's planes are rarely in a cache: `add` sends for what the block will need and fuses
+/// the block before it.
+class LabelFusion {
+public:
+  LabelFusion(const LabelView& view, BlockStore& store) : view_(view), store_(store) {}
+  LabelFusion(const LabelFusion&) = delete;
+  LabelFusion& operator=(const LabelFusion&) = delete;
+
+  /// `observation` is read before this returns, `block` written before the call after next or by `finish`.
+  void add(const BlockObservation& observation, Block& block);
+  /// Fuses what is left. To be called at the end of a task.
+  LabelStats finish();
+
+private:
+  void fuse_waiting();
+
+  const LabelView& view_;
+  BlockStore& store_;
+  BandVoxels bands_[2];
+  int current_ = 0;
+  Block* waiting_ = nullptr;  ///< not yet fused: bands_[1 - current_] of it
+  LabelStats stats_;
+};
 
 /// One vote for `id` (not 0): Boyer and Moore's majority vote.
 void vote_instance(InstancePlanes& planes, int offset, uint16_t id);

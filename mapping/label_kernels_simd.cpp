@@ -49,54 +49,39 @@ HWY_INLINE unsigned bits_of(FloatMask mask) {
   return unsigned(bytes[0]) | unsigned(bytes[1]) << 8;
 }
 
-bool select_band(const BlockObservation& observation, float band_m, LaneBits& band) {
+void select_band(const BlockObservation& observation, float band_m, BandVoxels& band) {
   const int lanes = int(hn::Lanes(kF));
   const auto limit = hn::Set(kF, band_m);
-  unsigned any = 0;
-  for (int i = 0; i < kBlockVoxels; i += lanes) {
-    unsigned bits = bits_at(observation.valid, i);
-    if (bits != 0) bits &= bits_of(hn::Lt(hn::Abs(hn::Load(kF, observation.sdf_m + i)), limit));
-    put_bits(bits, band.row, i);
-    any |= bits;
-  }
-  return any != 0;
-}
-
-int take_equal(const int32_t* ids, int32_t id, LaneBits& rest, LaneBits& taken) {
-  const int lanes = int(hn::Lanes(kF));
-  const auto wanted = hn::Set(kI, id);
+  band.groups = 0, band.bits = {};
   int count = 0;
-  for (int i = 0; i < kBlockVoxels; i += lanes) {
-    const unsigned before = bits_at(rest.row, i);
-    unsigned bits = 0;
-    if (before != 0) {
-      bits = before & bits_of(hn::RebindMask(kF, hn::Eq(hn::LoadU(kI, ids + i), wanted)));
-      put_bits(before & ~bits, rest.row, i);
+  for (uint32_t rest = observation.groups; rest != 0; rest &= rest - 1) {
+    const int group = __builtin_ctz(rest), first = group * kGroupVoxels;
+    const int before = count;
+    for (int i = first; i < first + kGroupVoxels; i += lanes) {
+      const FloatMask near =
+          hn::And(mask_of(bits_at(observation.valid, i)), hn::Lt(hn::Abs(hn::Load(kF, observation.sdf_m + i)), limit));
+      const unsigned bits = bits_of(near);
+      if (bits == 0) continue;
+      put_bits(bits, band.bits.row, i);
+      const auto mask = hn::RebindMask(kI, near);
+      // A whole vector is written; what is behind the last entry does not matter.
+      hn::StoreU(hn::Compress(hn::Iota(kI, i), mask), kI, band.lane + count);
+      hn::StoreU(hn::Compress(hn::Load(kI, observation.pixel + i), mask), kI, band.pixel + count);
       count += __builtin_popcount(bits);
     }
-    put_bits(bits, taken.row, i);
+    band.groups |= uint32_t(count != before) << group;
   }
-  return count;
+  band.count = count;
 }
 
-void add_evidence(const LaneBits& lanes_in, float amount, Plane& plane) {
+void fade_evidence(const LaneBits& lanes_in, std::span<Plane* const> planes, const float* added, float max_evidence) {
   const int lanes = int(hn::Lanes(kF));
-  const auto added = hn::Set(kF, amount);
+  const auto most = hn::Set(kF, max_evidence), zero = hn::Zero(kF);
   for (int i = 0; i < kBlockVoxels; i += lanes) {
     const unsigned bits = bits_at(lanes_in.row, i);
     if (bits == 0) continue;
-    const auto value = hn::Load(kF, plane.value + i);
-    hn::Store(hn::IfThenElse(mask_of(bits), hn::Add(value, added), value), kF, plane.value + i);
-  }
-}
-
-void fade_evidence(const LaneBits& lanes_in, std::span<Plane* const> planes, float added, float max_evidence) {
-  const int lanes = int(hn::Lanes(kF));
-  const auto room = hn::Set(kF, std::max(0.0f, max_evidence - added));
-  for (int i = 0; i < kBlockVoxels; i += lanes) {
-    const unsigned bits = bits_at(lanes_in.row, i);
-    if (bits == 0) continue;
-    auto total = hn::Zero(kF);
+    const auto room = hn::Max(zero, hn::Sub(most, hn::Load(kF, added + i)));
+    auto total = zero;
     for (const Plane* plane : planes) total = hn::Add(total, hn::Load(kF, plane->value + i));
     const FloatMask over = hn::And(mask_of(bits), hn::Gt(total, room));
     if (hn::AllFalse(kF, over)) continue;
@@ -108,6 +93,76 @@ void fade_evidence(const LaneBits& lanes_in, std::span<Plane* const> planes, flo
   }
 }
 
+/// The pixels to whom a rank names a class.
+HWY_INLINE FloatMask names(const SoftRank& rank, int i, int32_t nobody) {
+  return hn::And(hn::Gt(hn::Load(kF, rank.amount + i), hn::Zero(kF)),
+                 hn::RebindMask(kF, hn::Ne(hn::Load(kI, rank.slot + i), hn::Set(kI, nobody))));
+}
+
+void weigh_probabilities(SoftPixels& pixels) {
+  const int lanes = int(hn::Lanes(kF));
+  const auto zero = hn::Zero(kF), one = hn::Set(kF, 1.0f);
+  const auto none = hn::Set(kI, pixels.classes);
+  const auto classes = hn::Set(kF, float(pixels.classes)), evidence = hn::Set(kF, pixels.evidence);
+  const auto most = hn::Set(kF, kMostProbability);
+  const auto whole = hn::Set(kF, 1 - rounded_mass(int(pixels.ranks.size())));
+  const FloatMask nowhere = hn::Lt(zero, zero);
+  pixels.taken = pixels.invalid = 0;
+  pixels.any_left = false;
+  for (SoftRank& rank : pixels.ranks)  // so that the last vector adds nothing for pixels that are not there
+    for (int i = pixels.count; i < pixels.count + lanes; ++i) rank.slot[i] = pixels.classes, rank.amount[i] = 0;
+  for (int i = 0; i < pixels.count; i += lanes) {
+    auto sum = zero, named = zero;
+    FloatMask valid = hn::Not(nowhere);
+    for (const SoftRank& rank : pixels.ranks) {
+      const auto p = hn::Load(kF, rank.amount + i);
+      valid = hn::And(valid, hn::Ge(p, zero));  // neither negative nor not a number
+      sum = hn::Add(sum, hn::IfThenElseZero(hn::Gt(p, zero), p));
+      named = hn::Add(named, hn::IfThenElseZero(names(rank, i, pixels.classes), one));
+    }
+    valid = hn::And(valid, hn::Le(sum, most));
+    const FloatMask take = hn::And(valid, hn::Gt(named, zero));
+    auto even = zero, share = zero;  // of the unnamed: of all together if each had as much, and of each
+    FloatMask left = nowhere;
+    if (pixels.spread) {
+      const auto dropped = hn::IfThenElseZero(hn::Lt(sum, whole), hn::Sub(one, sum));
+      const auto others = hn::Sub(classes, named);
+      const FloatMask spread = hn::Gt(dropped, zero), shared = hn::And(spread, hn::Gt(others, zero));
+      share = hn::IfThenElseZero(shared, hn::Div(dropped, hn::IfThenElse(shared, others, one)));
+      even = hn::IfThenElse(shared, hn::Mul(share, classes), dropped);
+      for (size_t r = 0; r < pixels.ranks.size(); ++r) {
+        const SoftRank& rank = pixels.ranks[r];
+        const auto slot = hn::Load(kI, rank.slot + i);
+        FloatMask special = hn::Lt(hn::Load(kF, rank.amount + i), share);
+        for (size_t before = 0; before < r; ++before)
+          special =
+              hn::Or(special, hn::And(hn::Gt(hn::Load(kF, pixels.ranks[before].amount + i), zero),
+                                      hn::RebindMask(kF, hn::Eq(hn::Load(kI, pixels.ranks[before].slot + i), slot))));
+        left = hn::Or(left, hn::And(names(rank, i, pixels.classes), special));
+      }
+      left = hn::And(left, hn::And(take, spread));
+    }
+    const FloatMask adds = hn::AndNot(left, take);
+    even = hn::IfThenElseZero(adds, even);
+    auto added = even;
+    for (SoftRank& rank : pixels.ranks) {
+      const FloatMask takes = hn::And(adds, names(rank, i, pixels.classes));
+      const auto own = hn::IfThenElseZero(takes, hn::Sub(hn::Load(kF, rank.amount + i), share));
+      added = hn::Add(added, own);
+      hn::Store(hn::IfThenElse(hn::RebindMask(kI, takes), hn::Load(kI, rank.slot + i), none), kI, rank.slot + i);
+      hn::Store(hn::Mul(evidence, own), kF, rank.amount + i);
+    }
+    hn::Store(hn::Mul(evidence, even), kF, pixels.even + i);
+    hn::Store(hn::Mul(evidence, added), kF, pixels.added + i);
+    hn::Store(hn::IfThenElse(hn::RebindMask(kI, left), hn::Set(kI, SoftPixels::kLeft),
+                             hn::IfThenElseZero(hn::RebindMask(kI, adds), hn::Set(kI, SoftPixels::kAdds))),
+              kI, pixels.verdict + i);
+    pixels.taken += int(hn::CountTrue(kF, adds));
+    pixels.invalid += int(hn::CountTrue(kF, hn::Not(valid)));
+    pixels.any_left = pixels.any_left || !hn::AllFalse(kF, left);
+  }
+}
+
 }  // namespace felt::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -115,28 +170,23 @@ HWY_AFTER_NAMESPACE();
 namespace felt {
 
 HWY_EXPORT(select_band);
-HWY_EXPORT(take_equal);
-HWY_EXPORT(add_evidence);
 HWY_EXPORT(fade_evidence);
+HWY_EXPORT(weigh_probabilities);
 
-bool select_band(const BlockObservation& observation, float band_m, LaneBits& band) noexcept {
-  return simd_scalar_forced() ? select_band_scalar(observation, band_m, band)
-                              : HWY_DYNAMIC_DISPATCH(select_band)(observation, band_m, band);
+void select_band(const BlockObservation& observation, float band_m, BandVoxels& band) noexcept {
+  if (simd_scalar_forced()) return select_band_scalar(observation, band_m, band);
+  HWY_DYNAMIC_DISPATCH(select_band)(observation, band_m, band);
 }
 
-int take_equal(const int32_t ids[kBlockVoxels], int32_t id, LaneBits& rest, LaneBits& taken) noexcept {
-  return simd_scalar_forced() ? take_equal_scalar(ids, id, rest, taken)
-                              : HWY_DYNAMIC_DISPATCH(take_equal)(ids, id, rest, taken);
-}
-
-void add_evidence(const LaneBits& lanes, float amount, Plane& plane) noexcept {
-  if (simd_scalar_forced()) return add_evidence_scalar(lanes, amount, plane);
-  HWY_DYNAMIC_DISPATCH(add_evidence)(lanes, amount, plane);
-}
-
-void fade_evidence(const LaneBits& lanes, std::span<Plane* const> planes, float added, float max_evidence) noexcept {
+void fade_evidence(const LaneBits& lanes, std::span<Plane* const> planes, const float added[kBlockVoxels],
+                   float max_evidence) noexcept {
   if (simd_scalar_forced()) return fade_evidence_scalar(lanes, planes, added, max_evidence);
   HWY_DYNAMIC_DISPATCH(fade_evidence)(lanes, planes, added, max_evidence);
+}
+
+void weigh_probabilities(SoftPixels& pixels) noexcept {
+  if (simd_scalar_forced()) return weigh_probabilities_scalar(pixels);
+  HWY_DYNAMIC_DISPATCH(weigh_probabilities)(pixels);
 }
 
 }  // namespace felt

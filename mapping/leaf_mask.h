@@ -1,21 +1,26 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 
-#include "core/block.h"
+#include "mapping/region.h"
 
 namespace felt {
 
-/// Sets a leaf's value mask, a 64-bit word at a time: voxel i is active where `active(i)`.
-template <typename Leaf, typename Active>
-void set_active(Leaf& leaf, Active active) {
-  auto mask = leaf.getValueMask();
+/// The voxels i of a block where `active(i)`.
+template <typename Active>
+BlockMask mask_where(const Active& active) {
+  BlockMask mask;
   for (int x = 0; x < kBlockDim; ++x) {
-    uint64_t word = 0;
-    for (int i = 0; i < 64; ++i) word |= uint64_t(active(x << 6 | i)) << i;
-    mask.template getWord<uint64_t>(x) = word;
+    uint8_t on[64];  // apart from the packing, so that the compiler does 16 comparisons at once
+    for (int i = 0; i < 64; ++i) on[i] = active(x << 6 | i) ? 1 : 0;
+    for (int y = 0; y < kBlockDim; ++y) {
+      uint64_t bytes;
+      std::memcpy(&bytes, on + 8 * y, sizeof bytes);
+      mask.word[size_t(x)] |= (bytes * 0x0102040810204080u >> 56) << (8 * y);  // byte j to bit j
+    }
   }
-  leaf.setValueMask(mask);
+  return mask;
 }
 
 }  // namespace felt

@@ -10,7 +10,8 @@ namespace felt {
 
 TriangleMesh region_mesh(const Map& map, const Region& region) {
   std::vector<VertexEdge> edges;
-  const TriangleMesh whole = extract_mesh(map, {}, &edges);
+  TriangleMesh whole = extract_mesh(map, {}, &edges);
+  attach_beliefs(map, edges, whole);
   const auto inside = [&](uint32_t vertex) { return region.contains(nearest_voxel(edges[vertex])); };
   return part_of(whole, [&](const Triangle& t) { return inside(t[0]) + inside(t[1]) + inside(t[2]) >= 2; });
 }

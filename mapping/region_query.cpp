@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <map>
 #include <numbers>
 #include <queue>
@@ -55,6 +56,7 @@ private:
   struct State {
     uint32_t block;  ///< store number
     bool examined = false, queued = false;
+    std::array<uint32_t, 27> near;  ///< store numbers of the block's neighbours once it was examined
     BlockMask pending;  ///< bits that reached the block since its last visit
     BlockMask region, grown;
     BlockSurface surface;
@@ -102,7 +104,15 @@ private:
       if (!state_[n].examined) fresh.push_back(n);
     const auto examine = [&](size_t i) {
       State& state = state_[fresh[i]];
-      state.surface = examine_block(map_, map_.store[state.block], rule_);
+      const BlockCoord c = map_.store[state.block].coord;
+      BlockNeighbours near;
+      for (int n = 0; n < 27; ++n) {
+        const uint32_t number =
+            n == 13 ? state.block : map_.store.find({c.x + n / 9 - 1, c.y + n / 3 % 3 - 1, c.z + n % 3 - 1});
+        state.near[size_t(n)] = number;
+        near[size_t(n)] = number == BlockStore::kNone ? nullptr : &map_.store[number];
+      }
+      state.surface = examine_block(near, rule_);
       state.examined = true;
     };
     if (fresh.size() < 16) {
@@ -113,29 +123,22 @@ private:
   }
 
   void visit(uint32_t n) {
-    BlockMask grown = state_[n].pending & state_[n].surface.interior;
-    {
-      State& state = state_[n];
-      state.queued = false;
-      state.region |= state.pending & state.surface.candidate;
-      state.pending = {};
-      grown -= state.grown;
-      if (!grown.any()) return;
-      for (BlockMask last; !(last == grown);) {
-        last = grown;
-        grown |= dilated_inside(grown) & state.surface.interior;
-      }
-      grown -= state.grown;
-      state.grown |= grown;
+    State& state = state_[n];
+    state.queued = false;
+    state.region |= state.pending & state.surface.candidate;
+    BlockMask grown = (state.pending & state.surface.interior) - state.grown;
+    state.pending = {};
+    if (!grown.any()) return;
+    for (BlockMask last; !(last == grown);) {
+      last = grown;
+      grown |= dilated_inside(grown) & state.surface.interior;
     }
+    grown -= state.grown;
+    state.grown |= grown;
     const std::array<BlockMask, 27> reached = dilated(grown);
-    state_[n].region |= reached[13] & state_[n].surface.candidate;
-    const BlockCoord c = map_.store[state_[n].block].coord;
-    for (int i = 0; i < 27; ++i) {
-      if (i == 13 || !reached[i].any()) continue;
-      const uint32_t block = map_.store.find({c.x + i / 9 - 1, c.y + i / 3 % 3 - 1, c.z + i % 3 - 1});
-      if (block != BlockStore::kNone) reach(block, reached[i]);
-    }
+    state.region |= reached[13] & state.surface.candidate;
+    for (size_t i = 0; i < reached.size(); ++i)
+      if (i != 13 && state.near[i] != BlockStore::kNone && reached[i].any()) reach(state.near[i], reached[i]);
   }
 
   Region collect() const {
@@ -152,7 +155,7 @@ private:
   const Map& map_;
   const SurfaceRule rule_;
   std::vector<uint32_t> number_;  ///< by store number: index of its state
-  std::vector<State> state_;
+  std::deque<State> state_;  ///< never moved
   std::vector<uint32_t> wave_;
 };
 
@@ -308,7 +311,7 @@ Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const Regio
   snprintf(where, sizeof where, "point (%.3f, %.3f, %.3f)", point_m.x(), point_m.y(), point_m.z());
   const Eigen::Vector3d q = point_m / map.voxel_size_m;
   if (!q.allFinite() || q.array().abs().maxCoeff() > 1e9)
-    throw TouchError(describe_mismatch(where, "contact", "three finite coordinates inside the map", "this"));
+    throw TouchError(describe_mismatch(where, "contact", "three finite coordinates inside the map", std::string(where).substr(6)));
   const SurfaceRule band = band_rule(map, settings);
   const double radius = settings.snap_voxels;
   const auto lo = [&](double x) { return int32_t(std::ceil(x - radius)); };
@@ -345,6 +348,13 @@ Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const Regio
   return contact;
 }
 
+double normal_limit_deg(const Map& map, const Contact& contact, const RegionSettings& settings) {
+  constexpr double kNoises = 3, kMostDeg = 30;
+  if (settings.normal_change_deg >= kMostDeg) return settings.normal_change_deg;
+  const double noise_deg = normal_noise_deg(map, contact.voxel, band_rule(map, settings));
+  return std::max(settings.normal_change_deg, std::min(kNoises * noise_deg, kMostDeg));
+}
+
 Region find_region(const Map& map, const Contact& contact, const RegionSettings& settings) {
   validate(settings);
   SurfaceRule rule = band_rule(map, settings);
@@ -361,7 +371,7 @@ Region find_region(const Map& map, const Contact& contact, const RegionSettings&
         describe_mismatch("region", "rule", "connected, sphere, instance or segment", rule_name(settings.rule)));
   rule.slot = contact.slot;
   rule.class_ratio = float(settings.class_ratio);
-  rule.cos_normal_change = float(std::cos(settings.normal_change_deg * std::numbers::pi / 180));
+  rule.cos_normal_change = float(std::cos(normal_limit_deg(map, contact, settings) * std::numbers::pi / 180));
   if (std::isfinite(settings.color_change)) limit_color(map, contact.voxel, settings.color_change, rule);
   Flood flood(map, rule);
   Region region = flood.run(contact.voxel);

@@ -48,6 +48,11 @@ Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const Regio
 /// Deterministic; blocks are examined in parallel.
 Region find_region(const Map& map, const Contact& contact, const RegionSettings& settings);
 
+/// The largest angle between neighbours of a `connected` region at this contact, degrees: `normal_change_deg`, or where
+/// the surface around the contact is noisy, three times the median angle between neighbouring normals there, at most 30:
+/// neighbours on the two sides of a right-angled crease are 34 degrees apart (docs/touch.md).
+double normal_limit_deg(const Map& map, const Contact& contact, const RegionSettings& settings);
+
 /// The surface voxels seen in the mask: those that project onto a non-zero pixel and are not hidden, by more than two
 /// voxels, behind nearer surface voxels. Throws TouchError where the mask has not the camera's size, sees nothing of
 /// the map, or (with a contact) where the contact is not in it.

@@ -3,106 +3,48 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numbers>
+#include <vector>
+
+#include "mapping/interior_kernels.h"
 
 namespace felt {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-/// The block with two voxels around it; z rows padded so that the block's own rows start at 4 and rows are aligned.
-constexpr int kHalo = 2, kSide = 12, kRow = 16, kZ = 4;
-constexpr int tile_index(int x, int y, int z) { return ((x + kHalo) * kSide + y + kHalo) * kRow + z + kZ; }
 
-struct Tile {
-  alignas(64) float tsdf[kSide * kSide * kRow];  ///< NaN where unobserved
-};
-
-void fill_row(float* out, const Block* block, int row, int begin, int end, int shift, float min_weight) {
-  for (int z = begin; z < end; ++z) {
-    const float w = block == nullptr ? 0.0f : block->geometry->weight[row + z];
-    out[z + shift] = w >= min_weight ? block->geometry->tsdf[row + z] : kNan;
+void copy_observed(const Block* block, int first, int count, float min_weight, float* out) {
+  if (block == nullptr) {
+    std::fill_n(out, count, kNan);
+    return;
   }
+  const GeometryPlanes& g = *block->geometry;
+  for (int i = 0; i < count; ++i) out[i] = g.weight[first + i] >= min_weight ? g.tsdf[first + i] : kNan;
 }
 
-void gather(const Map& map, const Block& block, float min_weight, Tile& tile) {
-  const Block* near[3][3][3];
-  for (int dx = 0; dx < 3; ++dx)
-    for (int dy = 0; dy < 3; ++dy)
-      for (int dz = 0; dz < 3; ++dz)
-        near[dx][dy][dz] = map.store.get({block.coord.x + dx - 1, block.coord.y + dy - 1, block.coord.z + dz - 1});
+/// Fills the rows that normals around `candidate` are made of.
+void gather(const BlockNeighbours& near, const BlockMask& candidate, float min_weight, SurfaceTile& tile) {
+  constexpr int kHalo = SurfaceTile::kHalo, kFirstZ = SurfaceTile::kFirstZ;
+  uint64_t any = 0;
+  for (const uint64_t word : candidate.word) any |= word;
+  // Bit z: a candidate with this z. Blocks below and above matter to few, and hold a piece of every row.
+  any |= any >> 32;
+  any |= any >> 16;
+  any |= any >> 8;
+  const bool below = (any & 0x03) != 0, above = (any & 0xc0) != 0;
+  const std::array<uint16_t, SurfaceTile::kSide> rows = rows_near(candidate.word, 2);
   for (int x = -kHalo; x < 8 + kHalo; ++x)
     for (int y = -kHalo; y < 8 + kHalo; ++y) {
-      float* out = &tile.tsdf[tile_index(x, y, 0)];
+      if (!(rows[size_t(x + kHalo)] >> (y + kHalo) & 1)) continue;
+      float* out = &tile.tsdf[SurfaceTile::index(x, y, 0)];
       const int row = voxel_offset(x & 7, y & 7, 0);
-      const auto& column = near[(x >> 3) + 1][(y >> 3) + 1];
-      fill_row(out, column[0], row, 8 - kHalo, 8, -8, min_weight);
-      fill_row(out, column[1], row, 0, 8, 0, min_weight);
-      fill_row(out, column[2], row, 0, kHalo, 8, min_weight);
+      const Block* const* column = &near[size_t(9 * ((x >> 3) + 1) + 3 * ((y >> 3) + 1))];
+      std::fill_n(out - kFirstZ, kFirstZ, kNan);
+      std::fill_n(out + 8, kFirstZ, kNan);
+      if (below) copy_observed(column[0], row + 8 - kHalo, kHalo, min_weight, out - kHalo);
+      copy_observed(column[1], row, 8, min_weight, out);
+      if (above) copy_observed(column[2], row, kHalo, min_weight, out + 8);
     }
-}
-
-/// Half the central difference where both neighbours are observed, the one-sided difference where one is.
-float difference(float minus, float here, float plus) {
-  const bool has_minus = !std::isnan(minus), has_plus = !std::isnan(plus);
-  if (has_minus && has_plus) return 0.5f * (plus - minus);
-  return has_plus ? plus - here : has_minus ? here - minus : 0.0f;
-}
-
-struct Normal {
-  float x, y, z;
-  float dot(const Normal& o) const { return x * o.x + y * o.y + z * o.z; }
-};
-
-Normal normalized(float x, float y, float z) {
-  const float length = std::sqrt(x * x + y * y + z * z);
-  if (!(length > 0)) return {0, 0, 0};
-  const float scale = 1 / length;
-  return {x * scale, y * scale, z * scale};
-}
-
-/// A voxel of the band within one voxel of the block.
-struct BandVoxel {
-  int at;      ///< tile index
-  int offset;  ///< in the block, -1 outside
-};
-
-BlockMask interior_voxels(const Tile& tile, const BlockMask& candidate, float band_m, float cos_limit) {
-  BandVoxel band[1000];
-  Normal normal[1000];
-  int count = 0;
-  Normal sum{0, 0, 0};
-  for (int x = -1; x <= 8; ++x)
-    for (int y = -1; y <= 8; ++y)
-      for (int z = -1; z <= 8; ++z) {
-        const int at = tile_index(x, y, z);
-        const float* v = &tile.tsdf[at];
-        if (!(std::abs(*v) <= band_m)) continue;
-        const bool inside = ((x | y | z) & ~7) == 0;
-        normal[count] = normalized(difference(v[-kSide * kRow], *v, v[kSide * kRow]), difference(v[-kRow], *v, v[kRow]),
-                                   difference(v[-1], *v, v[1]));
-        sum = {sum.x + normal[count].x, sum.y + normal[count].y, sum.z + normal[count].z};
-        band[count++] = {at, inside ? voxel_offset(x, y, z) : -1};
-      }
-  // Normals within half the limit of one direction are within the limit of each other: most blocks end here.
-  const Normal mean = normalized(sum.x, sum.y, sum.z);
-  const float cos_half = std::sqrt(0.5f * (1 + cos_limit));
-  if (std::all_of(normal, normal + count, [&](const Normal& n) { return n.dot(mean) >= cos_half; })) return candidate;
-
-  int16_t number[kSide * kSide * kRow];
-  std::fill_n(number, std::size(number), int16_t(-1));
-  for (int i = 0; i < count; ++i) number[band[i].at] = int16_t(i);
-  BlockMask interior;
-  for (int i = 0; i < count; ++i) {
-    if (band[i].offset < 0 || !candidate.test(band[i].offset)) continue;
-    bool agrees = true;
-    for (int dx = -1; dx <= 1 && agrees; ++dx)
-      for (int dy = -1; dy <= 1 && agrees; ++dy)
-        for (int dz = -1; dz <= 1; ++dz) {
-          const int other = number[band[i].at + (dx * kSide + dy) * kRow + dz];
-          agrees = agrees && (other < 0 || other == i || normal[i].dot(normal[other]) >= cos_limit);
-        }
-    if (agrees) interior.set(band[i].offset);
-  }
-  return interior;
 }
 
 /// Bits where `keep(offset)` holds. Bytes first, eight of which one multiplication gathers: compilers turn the first
@@ -177,31 +119,77 @@ BlockMask candidates(const Block& block, const SurfaceRule& rule) {
   return mask;
 }
 
-BlockSurface examine_block(const Map& map, const Block& block, const SurfaceRule& rule) {
+BlockSurface examine_block(const BlockNeighbours& near, const SurfaceRule& rule) {
   BlockSurface surface;
-  surface.candidate = candidates(block, rule);
+  surface.candidate = candidates(*near[13], rule);
   if (!surface.candidate.any()) return surface;
   if (rule.cos_normal_change <= -1) {
     surface.interior = surface.candidate;
     return surface;
   }
-  Tile tile;
-  gather(map, block, rule.min_weight, tile);
+  SurfaceTile tile;
+  gather(near, surface.candidate, rule.min_weight, tile);
   surface.interior = interior_voxels(tile, surface.candidate, rule.band_m, rule.cos_normal_change);
   return surface;
 }
 
-Eigen::Vector3f surface_normal(const Map& map, const Index3& voxel, float min_weight) {
-  const auto at = [&](int dx, int dy, int dz) {
-    const Index3 v{voxel.x + dx, voxel.y + dy, voxel.z + dz};
-    const Block* block = map.store.get(block_of_voxel(v));
-    const int offset = offset_in_block(v);
-    return block != nullptr && block->geometry->weight[offset] >= min_weight ? block->geometry->tsdf[offset] : kNan;
+BlockNeighbours neighbours_of(const Map& map, const BlockCoord& c) {
+  BlockNeighbours near;
+  for (int n = 0; n < 27; ++n)
+    near[size_t(n)] = map.store.get({c.x + n / 9 - 1, c.y + n / 3 % 3 - 1, c.z + n % 3 - 1});
+  return near;
+}
+
+double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule& rule) {
+  constexpr int kReach = 8;
+  BlockMask everywhere;
+  everywhere.word.fill(~uint64_t(0));
+  std::vector<float> cosines;
+  const auto examine = [&](const BlockCoord& c) {
+    const BlockNeighbours near = neighbours_of(map, c);
+    if (near[13] == nullptr) return;
+    const BlockMask band = surface_band(*near[13], rule.band_m, rule.min_weight);
+    if (!band.any()) return;
+    SurfaceTile tile;
+    gather(near, everywhere, rule.min_weight, tile);
+    const Index3 f = first_voxel(c);
+    const auto is_near = [&](const Index3& v) {
+      return std::max({std::abs(f.x + v.x - centre.x), std::abs(f.y + v.y - centre.y),
+                       std::abs(f.z + v.z - centre.z)}) <= kReach;
+    };
+    for_each_bit(band, [&](int offset) {
+      const Index3 v = voxel_of_offset(offset);
+      if (!is_near(v)) return;
+      const SurfaceNormal own = smoothed_normal(tile, SurfaceTile::index(v.x, v.y, v.z));
+      for (const Index3& u : {Index3{v.x + 1, v.y, v.z}, {v.x, v.y + 1, v.z}, {v.x, v.y, v.z + 1}}) {
+        const int at = SurfaceTile::index(u.x, u.y, u.z);
+        if (!is_near(u) || !(std::abs(tile.tsdf[at]) <= rule.band_m)) continue;
+        const SurfaceNormal its = smoothed_normal(tile, at);
+        cosines.push_back(own.x * its.x + own.y * its.y + own.z * its.z);
+      }
+    });
   };
-  const float here = at(0, 0, 0);
-  if (std::isnan(here)) return Eigen::Vector3f::Zero();
-  const Normal n = normalized(difference(at(-1, 0, 0), here, at(1, 0, 0)), difference(at(0, -1, 0), here, at(0, 1, 0)),
-                              difference(at(0, 0, -1), here, at(0, 0, 1)));
+  const BlockCoord lo = block_of_voxel({centre.x - kReach, centre.y - kReach, centre.z - kReach}),
+                   hi = block_of_voxel({centre.x + kReach, centre.y + kReach, centre.z + kReach});
+  for (int x = lo.x; x <= hi.x; ++x)
+    for (int y = lo.y; y <= hi.y; ++y)
+      for (int z = lo.z; z <= hi.z; ++z) examine({x, y, z});
+  if (cosines.empty()) return 0;
+  const auto middle = cosines.begin() + std::ptrdiff_t(cosines.size() / 2);
+  std::nth_element(cosines.begin(), middle, cosines.end());
+  return std::acos(std::clamp(double(*middle), -1.0, 1.0)) * 180 / std::numbers::pi;
+}
+
+Eigen::Vector3f surface_normal(const Map& map, const Index3& voxel, float min_weight) {
+  SurfaceTile tile;
+  for (int n = 0; n < 27; ++n) {
+    const Index3 d{n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1}, v{voxel.x + d.x, voxel.y + d.y, voxel.z + d.z};
+    const Block* block = map.store.get(block_of_voxel(v));
+    copy_observed(block, offset_in_block(v), 1, min_weight, &tile.tsdf[SurfaceTile::index(d.x, d.y, d.z)]);
+  }
+  constexpr int kHere = SurfaceTile::index(0, 0, 0);
+  if (std::isnan(tile.tsdf[kHere])) return Eigen::Vector3f::Zero();
+  const SurfaceNormal n = smoothed_normal(tile, kHere);
   return {n.x, n.y, n.z};
 }
 

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <limits>
-
 #include <Eigen/Core>
+#include <array>
+#include <limits>
 
 #include "mapping/map.h"
 #include "mapping/region.h"
@@ -36,11 +36,19 @@ BlockMask surface_band(const Block& block, float band_m, float min_weight);
 /// Band, class, colour and radius limits; the specification of `connected`'s candidates.
 BlockMask candidates(const Block& block, const SurfaceRule& rule);
 
-/// Reads the block and its 26 neighbours; blocks may be examined in parallel.
-BlockSurface examine_block(const Map& map, const Block& block, const SurfaceRule& rule);
+/// A block and its neighbours, null where there is none: entry 9 (dx + 1) + 3 (dy + 1) + dz + 1 lies at offset (dx, dy,
+/// dz), entry 13 is the block itself.
+using BlockNeighbours = std::array<const Block*, 27>;
 
-/// Unit gradient of the signed distance at a voxel by central differences, one-sided at unobserved neighbours; zero
-/// where there is none.
+/// Reads the block and its neighbours; blocks may be examined in parallel.
+BlockSurface examine_block(const BlockNeighbours& near, const SurfaceRule& rule);
+
+/// How noisy the surface is around a voxel: the median angle, degrees, between the normals of face neighbours of the
+/// band within eight voxels of it. 0 where there are none.
+double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule& rule);
+
+/// Unit normal of the surface at a voxel, towards free space: `smoothed_normal` (mapping/interior_kernels.h). Zero where
+/// there is none.
 Eigen::Vector3f surface_normal(const Map& map, const Index3& voxel, float min_weight);
 
 }  // namespace felt

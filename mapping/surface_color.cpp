@@ -16,34 +16,6 @@ namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-/// What is known of a voxel that a colour may show.
-struct Known {
-  uint16_t slot = ClassTable::kNoSlot;
-  float value = kNan;  ///< of the ramp
-};
-
-/// What a colour shows of a voxel.
-class SurfaceBeliefs {
-public:
-  SurfaceBeliefs(const Map& map, const SurfaceColor& color)
-      : map_(map), color_(color), touched_(std::make_shared<const std::vector<TouchView>>(touch_views(map))) {
-    if (color.property >= 0) property_.emplace(map, color.property, touched_);
-  }
-
-  Known at(const Index3& voxel) const {
-    const ClassBelief belief = class_belief_at(map_, *touched_, voxel);
-    if (!property_) return {belief.slot, belief.slot == ClassTable::kNoSlot ? kNan : belief.entropy};
-    const PropertyEstimate estimate = property_->at(voxel);
-    return {belief.slot, color_.source == SurfaceColor::Source::mean ? estimate.mean : estimate.sd};
-  }
-
-private:
-  const Map& map_;
-  const SurfaceColor& color_;
-  TouchViews touched_;
-  std::optional<PropertyView> property_;
-};
-
 constexpr Rgba8 kNothingKnown{128, 128, 128, 255};
 
 /// Black over red to yellow for t in [0, 1].
@@ -52,17 +24,21 @@ Rgba8 heat(float t) {
   return {level(2 * t), level(2 * t - 1), 0, 255};
 }
 
-ColorRange range_of(const Map& map, const SurfaceColor& color, const std::vector<Known>& known) {
+ColorRange range_of(const Map& map, const SurfaceColor& color, const std::vector<float>& values) {
   if (color.source == SurfaceColor::Source::entropy) return {0, std::log(float(std::max(2, map.classes.size())))};
   ColorRange range{std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
-  for (const Known& k : known)
-    if (std::isfinite(k.value)) range = {std::min(range.low, k.value), std::max(range.high, k.value)};
+  for (const float value : values)
+    if (std::isfinite(value)) range = {std::min(range.low, value), std::max(range.high, value)};
   return range.low <= range.high ? range : ColorRange{};
 }
 
-std::string scalar_name(const Map& map, const SurfaceColor& color) {
-  if (color.property < 0) return "entropy";
-  return map.properties[color.property].name + (color.source == SurfaceColor::Source::mean ? "_mean" : "_sd");
+std::string mean_name(const Property& property) { return property.name + "_mean"; }
+std::string sd_name(const Property& property) { return property.name + "_sd"; }
+
+/// `value(voxel)` of the voxel nearest to each vertex, in parallel.
+template <typename Value>
+void at_vertices(const std::vector<VertexEdge>& edges, const Value& value) {
+  tbb::parallel_for(size_t(0), edges.size(), [&](size_t i) { value(i, nearest_voxel(edges[i])); });
 }
 
 }  // namespace
@@ -89,33 +65,59 @@ SurfaceColor parse_surface_color(const std::string& text, const Map& map) {
   throw ConfigError(describe_mismatch("--color-by", "what the map can show", "one of " + possible, "'" + text + "'"));
 }
 
+void attach_beliefs(const Map& map, const std::vector<VertexEdge>& edges, TriangleMesh& mesh) {
+  if (map.classes.empty()) return;
+  const auto touched = std::make_shared<const std::vector<TouchView>>(touch_views(map));
+  mesh.labels.assign(edges.size(), 0);
+  MeshScalars probability{"label_prob", std::vector<float>(edges.size(), kNan)};
+  MeshScalars entropy{"entropy", std::vector<float>(edges.size(), kNan)};
+  at_vertices(edges, [&](size_t i, const Index3& voxel) {
+    const ClassBelief belief = class_belief_at(map, *touched, voxel);
+    if (belief.slot == ClassTable::kNoSlot) return;
+    mesh.labels[i] = map.classes.at_slot(belief.slot).id;
+    probability.values[i] = belief.probability;
+    entropy.values[i] = belief.entropy;
+  });
+  mesh.scalars.push_back(std::move(probability));
+  mesh.scalars.push_back(std::move(entropy));
+  if (map.properties.empty()) return;
+  MeshScalars reached{"touched", std::vector<float>(edges.size(), 0.0f)};
+  for (int p = 0; p < map.properties.size(); ++p) {
+    const PropertyView view(map, p, touched);
+    MeshScalars mean{mean_name(map.properties[p]), std::vector<float>(edges.size())};
+    MeshScalars sd{sd_name(map.properties[p]), std::vector<float>(edges.size())};
+    at_vertices(edges, [&](size_t i, const Index3& voxel) {
+      const PropertyEstimate estimate = view.at(voxel);
+      mean.values[i] = estimate.mean;
+      sd.values[i] = estimate.sd;
+      if (estimate.touched) reached.values[i] = 1;
+    });
+    mesh.scalars.push_back(std::move(mean));
+    mesh.scalars.push_back(std::move(sd));
+  }
+  mesh.scalars.push_back(std::move(reached));
+}
+
 std::optional<ColorRange> color_surface(const Map& map, const std::vector<VertexEdge>& edges, const SurfaceColor& color,
                                         TriangleMesh& mesh) {
   using Source = SurfaceColor::Source;
-  if (map.classes.empty()) return std::nullopt;
-  std::vector<Known> known;
-  const SurfaceBeliefs beliefs(map, color);
-  known.resize(edges.size());
-  tbb::parallel_for(size_t(0), edges.size(), [&](size_t i) { known[i] = beliefs.at(nearest_voxel(edges[i])); });
-  const auto seen = [](const Known& k) { return k.slot != ClassTable::kNoSlot; };
-  mesh.labels.resize(known.size());
-  for (size_t i = 0; i < known.size(); ++i) mesh.labels[i] = seen(known[i]) ? map.classes.at_slot(known[i].slot).id : 0;
-  if (color.source == Source::rgb) return std::nullopt;
-
-  mesh.colors.assign(known.size(), kNothingKnown);
+  if (map.classes.empty() || color.source == Source::rgb) return std::nullopt;
+  mesh.colors.assign(edges.size(), kNothingKnown);
   if (color.source == Source::classes) {
-    for (size_t i = 0; i < known.size(); ++i)
-      if (seen(known[i])) mesh.colors[i] = map.classes.at_slot(known[i].slot).color;
+    const std::vector<float>& probability = *TriangleMesh::find(mesh.scalars, "label_prob");
+    for (size_t i = 0; i < edges.size(); ++i)
+      if (std::isfinite(probability[i]))
+        mesh.colors[i] = map.classes.at_slot(map.classes.slot_of_id(mesh.labels[i])).color;
     return std::nullopt;
   }
-  const ColorRange range = range_of(map, color, known);
+  const std::string name = color.source == Source::entropy ? "entropy"
+                           : color.source == Source::mean  ? mean_name(map.properties[color.property])
+                                                           : sd_name(map.properties[color.property]);
+  const std::vector<float>& values = *TriangleMesh::find(mesh.scalars, name);
+  const ColorRange range = range_of(map, color, values);
   const float span = range.high > range.low ? range.high - range.low : 1.0f;
-  MeshScalars scalars{scalar_name(map, color), {}};
-  for (size_t i = 0; i < known.size(); ++i) {
-    scalars.values.push_back(known[i].value);
-    if (std::isfinite(known[i].value)) mesh.colors[i] = heat((known[i].value - range.low) / span);
-  }
-  mesh.scalars.push_back(std::move(scalars));
+  for (size_t i = 0; i < values.size(); ++i)
+    if (std::isfinite(values[i])) mesh.colors[i] = heat((values[i] - range.low) / span);
   return range;
 }
 

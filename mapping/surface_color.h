@@ -28,12 +28,17 @@ struct ColorRange {
 /// The voxel nearest to a vertex.
 Index3 nearest_voxel(const VertexEdge& edge);
 
-/// Gives every vertex the colour of what is believed of the voxel nearest to it: of its class by the class table, of
-/// entropy (nats, from 0 to the most that as many classes can have) and of the mean or standard deviation of the next
-/// reading (unit of the property, from the least to the greatest on the surface) by a ramp from black over red to
-/// yellow, and grey where nothing is known. Sets `labels` to class ids (0: nothing known) where the map has classes,
-/// and appends what a ramp shows to `scalars` as "entropy", "<property>_mean" or "<property>_sd". `edges`: of
-/// `extract_mesh`. Returns the range of the ramp; nothing for rgb and class. Vision and touches count alike.
+/// Gives a surface what the map believes of it, vertex by vertex from the voxel nearest to it. Where the map has
+/// classes: `labels`, class ids (0: nothing known), and the scalars "label_prob" (probability of that class) and
+/// "entropy" (nats), NaN where nothing is known. For each property of the map the scalars "<property>_mean" and
+/// "<property>_sd" of the next reading (unit of the property, NaN where nothing is known), then "touched" (1 where a
+/// touch reached, else 0). Vision and touches count alike. `edges`: of `extract_mesh`.
+void attach_beliefs(const Map& map, const std::vector<VertexEdge>& edges, TriangleMesh& mesh);
+
+/// Gives every vertex of a surface with its beliefs (attach_beliefs) the colour of what is believed there: of its class
+/// by the class table, of entropy (nats, from 0 to the most that as many classes can have) and of the mean or standard
+/// deviation of the next reading (from the least to the greatest on the surface) by a ramp from black over red to
+/// yellow, and grey where nothing is known. Returns the range of the ramp; nothing for rgb and class.
 std::optional<ColorRange> color_surface(const Map& map, const std::vector<VertexEdge>& edges, const SurfaceColor& color,
                                         TriangleMesh& mesh);
 

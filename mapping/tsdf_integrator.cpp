@@ -13,21 +13,11 @@ namespace {
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// Per-pixel factor of (d - z), or null for the optical axis.
-const float* depth_scale(const Frame& frame, const IntegrationConfig& config, IntegrationScratch& scratch) {
+/// Per-pixel factor of (d - z) to the tangent plane.
+const float* tangent_scale(const Frame& frame, const IntegrationConfig& config, IntegrationScratch& scratch) {
   const PinholeCamera& camera = frame.camera;
   const int width = frame.depth_m.width(), height = frame.depth_m.height();
-  if (config.distance == DistanceModel::optical_axis) return nullptr;
-  if (config.distance == DistanceModel::ray) {
-    if (scratch.depth_scale_camera == camera && !scratch.depth_scale.empty()) return scratch.depth_scale.data();
-    scratch.depth_scale.resize(size_t(width) * height);
-    for (int v = 0; v < height; ++v)
-      for (int u = 0; u < width; ++u) scratch.depth_scale[size_t(v) * width + u] = float(camera.ray(u, v).norm());
-    scratch.depth_scale_camera = camera;
-    return scratch.depth_scale.data();
-  }
   scratch.depth_scale.resize(size_t(width) * height);
-  scratch.depth_scale_camera = {};
   // Neighbours farther off than a surface seen at 80 degrees would be are another surface's.
   constexpr float kSteepest = 5.67f;
   const SlopeView view{.depth_m = frame.depth_m.data(),
@@ -92,6 +82,9 @@ DepthView depth_view(const Frame& frame, const IntegrationConfig& config, const 
     for (int y = 0; y < 8; ++y)
       for (int z = 0; z < 8; ++z) view.plane[c][y * 8 + z] = float(per_voxel(c, 1) * y + per_voxel(c, 2) * z);
   }
+  view.along_ray = config.distance == DistanceModel::ray;
+  view.centre[0] = float(camera.cx + 0.5), view.centre[1] = float(camera.cy + 0.5);
+  view.inverse_focal[0] = float(1 / camera.fx), view.inverse_focal[1] = float(1 / camera.fy);
   view.min_depth_m = least_usable_m(config.min_depth_m), view.max_depth_m = config.max_depth_m;
   view.truncation_m = float(map.truncation_m);
   const double dropoff_start = std::min(double(config.dropoff_start_vox) * map.voxel_size_m, 0.99 * map.truncation_m);
@@ -134,10 +127,11 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
 
   const auto fusing = Clock::now();
   // Distance to the tangent plane is shorter than along the optical axis: a voxel far in front may be in the band.
-  const bool bounded = config.distance != DistanceModel::tangent_plane;
-  const DepthView view = depth_view(frame, config, map, depth_scale(frame, config, scratch),
-                                    bounded ? &scratch.allocation.tiles : nullptr);
+  const bool tangent = config.distance == DistanceModel::tangent_plane;
+  const DepthView view = depth_view(frame, config, map, tangent ? tangent_scale(frame, config, scratch) : nullptr,
+                                    tangent ? nullptr : &scratch.allocation.tiles);
   const auto* rgba = reinterpret_cast<const uint32_t*>(frame.color.data());
+  const float color_band_m = std::min(view.truncation_m, config.color_band_vox * float(map.voxel_size_m));
   const bool says_classes = !frame.labels.empty() || !frame.probabilities.empty();
   const double novelty =
       says_classes ? scratch.viewpoints.add(frame.T_world_camera, config.labels.novelty_m, config.labels.novelty_deg)
@@ -149,7 +143,7 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
   tbb::parallel_for(tbb::blocked_range<size_t>(0, coords.size(), 16), [&](const tbb::blocked_range<size_t>& range) {
     BlockObservation observation;
     size_t observed = 0;
-    LabelStats label_stats;
+    LabelFusion fusion(labels, map.store);
     uint64_t next_cubes = cubes_in_band(coords[range.begin()], view);
     for (size_t n = range.begin(); n < range.end(); ++n) {
       Block& block = map.store[scratch.blocks[n]];
@@ -161,9 +155,10 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
       if (cubes == 0 || !observe_block(coords[n], view, observation, cubes)) continue;
       ++observed;
       fuse_tsdf(observation, view.max_weight, *block.geometry);
-      if (block.color != nullptr && rgba != nullptr) fuse_color(observation, rgba, view.truncation_m, *block.color);
-      if (labelled) label_stats += fuse_labels(observation, labels, block, map.store);
+      if (block.color != nullptr && rgba != nullptr) fuse_color(observation, rgba, color_band_m, *block.color);
+      if (labelled) fusion.add(observation, block);
     }
+    const LabelStats label_stats = fusion.finish();
     updated.fetch_add(observed, std::memory_order_relaxed);
     label_voxels.fetch_add(label_stats.voxels, std::memory_order_relaxed);
     label_unknown.fetch_add(label_stats.unknown, std::memory_order_relaxed);

@@ -26,9 +26,8 @@ struct FrameStats {
 struct IntegrationScratch {
   AllocationScratch allocation;
   std::vector<uint32_t> blocks;
-  std::vector<float> depth_scale;    ///< per pixel factor of the distance model
-  PinholeCamera depth_scale_camera;  ///< of the cached ray lengths
-  ViewNovelty viewpoints;            ///< of the frames fused so far
+  std::vector<float> depth_scale;  ///< per pixel factor of the distance to the tangent plane
+  ViewNovelty viewpoints;          ///< of the frames fused so far
 };
 
 /// Fuses one frame: the frame loop of the engine. Bit-identical for any number of threads (each block is written by one

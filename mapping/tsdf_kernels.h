@@ -17,10 +17,13 @@ namespace felt {
 struct DepthView {
   const float* depth_m = nullptr;  ///< width * height; NaN, infinite and out-of-range values are ignored
   const float* scale = nullptr;  ///< width * height: what (d - z) is multiplied with, or null for 1; 0: pixel unusable
+  bool along_ray =
+      false;  ///< (d - z) is multiplied with |r|, r = (x/z, y/z, 1) of the voxel's own centre; not with `scale`
   int width = 0, height = 0;
   double first[3][4] = {};  ///< row c: (hu, hv, z) of world voxel index (i, j, k): first[c] . (i, j, k, 1)
   alignas(64) float plane[3][64] = {};
   float step_x[3] = {};
+  float centre[2] = {}, inverse_focal[2] = {};  ///< r of a pixel (u, v) as projected: ((u, v) - centre) * inverse_focal
   float min_depth_m = 0, max_depth_m = 0;
   float truncation_m = 0;
   float dropoff_start_m = 0;  ///< positive: behind the surface
@@ -73,7 +76,7 @@ uint64_t cubes_in_band_scalar(const BlockCoord& block, const DepthView& view) no
 
 /// Projects the block's voxels into the view. Returns whether any voxel is observed. Lanes that are not valid hold
 /// unspecified values. `cubes` from `cubes_in_band` saves looking at the others and changes nothing. Every target gives
-/// the scalar version's bits: only +, -, *, / and comparisons, each rounded once.
+/// the scalar version's bits: only +, -, *, /, sqrt and comparisons, each rounded once.
 bool observe_block(const BlockCoord& block, const DepthView& view, BlockObservation& out,
                    uint64_t cubes = kAllCubes) noexcept;
 bool observe_block_scalar(const BlockCoord& block, const DepthView& view, BlockObservation& out,

@@ -21,6 +21,11 @@ float observation_weight(const DepthView& view, float d, float sdf) {
   return w;
 }
 
+float ray_length(const DepthView& view, float u, float v) {
+  const float x = (u - view.centre[0]) * view.inverse_focal[0], y = (v - view.centre[1]) * view.inverse_focal[1];
+  return std::sqrt((1 + x * x) + y * y);
+}
+
 }  // namespace
 
 uint64_t cubes_in_band_scalar(const BlockCoord& block, const DepthView& view) noexcept {
@@ -69,6 +74,8 @@ bool observe_block_scalar(const BlockCoord& block, const DepthView& view, BlockO
       const float scale = view.scale[pixel];
       if (!(scale > 0)) continue;
       sdf = sdf * scale;
+    } else if (view.along_ray) {
+      sdf = sdf * ray_length(view, u, v);
     }
     if (!(sdf > -view.truncation_m)) continue;
     if (!view.carve && !(sdf < view.truncation_m)) continue;

@@ -140,7 +140,9 @@ uint64_t cubes_in_band(const BlockCoord& block, const DepthView& view) {
   return cubes;
 }
 
-template <bool kScaled, WeightModel kModel>
+enum class Factor { none, ray, image };  ///< of d - z
+
+template <Factor kFactor, WeightModel kModel>
 bool observe(const BlockCoord& block, const DepthView& view, BlockObservation& out, uint64_t cubes) {
   float base[3];
   block_base(block, view, base);
@@ -152,6 +154,8 @@ bool observe(const BlockCoord& block, const DepthView& view, BlockObservation& o
   const FloatVec truncation = hn::Set(kF, view.truncation_m), minus_truncation = hn::Set(kF, -view.truncation_m);
   // Carving takes free space at any distance in front.
   const FloatVec sdf_limit = hn::Set(kF, view.carve ? HWY_MAX(view.max_depth_m, 1.0f) * 1e6f : view.truncation_m);
+  const FloatVec centre_u = hn::Set(kF, view.centre[0]), inverse_fx = hn::Set(kF, view.inverse_focal[0]);
+  const FloatVec centre_v = hn::Set(kF, view.centre[1]), inverse_fy = hn::Set(kF, view.inverse_focal[1]);
   const FloatVec dropoff_start = hn::Set(kF, -view.dropoff_start_m), dropoff_slope = hn::Set(kF, view.dropoff_slope);
   std::memset(out.valid, 0, sizeof out.valid);
   out.groups = 0;
@@ -175,15 +179,19 @@ bool observe(const BlockCoord& block, const DepthView& view, BlockObservation& o
       any = any || !hn::AllFalse(kF, inside);
       store_bits(inside, i, out.valid);
       hn::Store(z, kF, out.sdf_m + i);
+      if constexpr (kFactor == Factor::ray) {  // kept where the weight will be: it is asked for once depth is there
+        const FloatVec x = hn::Mul(hn::Sub(u, centre_u), inverse_fx), y = hn::Mul(hn::Sub(v, centre_v), inverse_fy);
+        hn::Store(hn::Sqrt(hn::Add(hn::Add(one, hn::Mul(x, x)), hn::Mul(y, y))), kF, out.weight + i);
+      }
       hn::Store(hn::IfThenElseZero(hn::RebindMask(kI, inside), index), kI, out.pixel + i);
     }
     in_view |= uint32_t(any) << group;
   }
   if (in_view == 0) return false;
   alignas(64) float depth_m[kBlockVoxels];
-  alignas(64) float scales[kScaled ? kBlockVoxels : 1];
+  alignas(64) float scales[kFactor == Factor::image ? kBlockVoxels : 1];
   fetch_pixels(view.depth_m, out.pixel, in_view, depth_m);
-  if constexpr (kScaled) fetch_pixels(view.scale, out.pixel, in_view, scales);
+  if constexpr (kFactor == Factor::image) fetch_pixels(view.scale, out.pixel, in_view, scales);
 
   for (uint32_t rest = in_view; rest != 0; rest &= rest - 1) {
     const int group = __builtin_ctz(rest);
@@ -192,7 +200,8 @@ bool observe(const BlockCoord& block, const DepthView& view, BlockObservation& o
       const FloatVec d = hn::Load(kF, depth_m + i);
       FloatVec sdf = hn::Sub(d, hn::Load(kF, out.sdf_m + i));
       FloatMask valid = hn::And(load_bits(out.valid, i), hn::And(hn::Ge(d, nearest), hn::Le(d, farthest)));
-      if constexpr (kScaled) {
+      if constexpr (kFactor == Factor::ray) sdf = hn::Mul(sdf, hn::Load(kF, out.weight + i));
+      if constexpr (kFactor == Factor::image) {
         const FloatVec scale = hn::Load(kF, scales + i);
         valid = hn::And(valid, hn::Gt(scale, zero));
         sdf = hn::Mul(sdf, scale);
@@ -211,21 +220,22 @@ bool observe(const BlockCoord& block, const DepthView& view, BlockObservation& o
   return out.groups != 0;
 }
 
-template <bool kScaled>
+template <Factor kFactor>
 bool observe_weighted(const BlockCoord& block, const DepthView& view, BlockObservation& out, uint64_t cubes) {
   switch (view.weight) {
     case WeightModel::inverse_square:
-      return observe<kScaled, WeightModel::inverse_square>(block, view, out, cubes);
+      return observe<kFactor, WeightModel::inverse_square>(block, view, out, cubes);
     case WeightModel::sensor_noise:
-      return observe<kScaled, WeightModel::sensor_noise>(block, view, out, cubes);
+      return observe<kFactor, WeightModel::sensor_noise>(block, view, out, cubes);
     default:
-      return observe<kScaled, WeightModel::constant>(block, view, out, cubes);
+      return observe<kFactor, WeightModel::constant>(block, view, out, cubes);
   }
 }
 
 bool observe_block(const BlockCoord& block, const DepthView& view, BlockObservation& out, uint64_t cubes) {
-  return view.scale != nullptr ? observe_weighted<true>(block, view, out, cubes)
-                               : observe_weighted<false>(block, view, out, cubes);
+  if (view.scale != nullptr) return observe_weighted<Factor::image>(block, view, out, cubes);
+  return view.along_ray ? observe_weighted<Factor::ray>(block, view, out, cubes)
+                        : observe_weighted<Factor::none>(block, view, out, cubes);
 }
 
 void fuse_tsdf(const BlockObservation& observation, float max_weight, GeometryPlanes& planes) {
@@ -255,10 +265,19 @@ void fuse_color(const BlockObservation& observation, const uint32_t* rgba, float
   const FloatVec band = hn::Set(kF, band_m), one = hn::Set(kF, 1.0f), top = hn::Set(kF, float(kMaxColorCount));
   const auto byte_mask = hn::Set(kI, 0xff);
   const int lanes = int(hn::Lanes(kF));
+  uint32_t groups = 0;  // with a voxel in the band
+  for (uint32_t rest = observation.groups; rest != 0; rest &= rest - 1) {
+    const int group = __builtin_ctz(rest);
+    bool any = false;
+    for (int i = group * kGroupVoxels; i < (group + 1) * kGroupVoxels; i += lanes)
+      any = any || !hn::AllFalse(kF, hn::And(load_bits(observation.valid, i),
+                                             hn::Lt(hn::Abs(hn::Load(kF, observation.sdf_m + i)), band)));
+    groups |= uint32_t(any) << group;
+  }
   // First fetch, then average: a vector load right behind the stores it depends on would stall.
   alignas(64) int32_t pixels[kBlockVoxels];
-  fetch_pixels(reinterpret_cast<const int32_t*>(rgba), observation.pixel, observation.groups, pixels);
-  for (uint32_t rest = observation.groups; rest != 0; rest &= rest - 1) {
+  fetch_pixels(reinterpret_cast<const int32_t*>(rgba), observation.pixel, groups, pixels);
+  for (uint32_t rest = groups; rest != 0; rest &= rest - 1) {
     const int first = __builtin_ctz(rest) * kGroupVoxels;
     for (int i = first; i < first + kGroupVoxels; i += lanes) {
       const auto pixel = hn::Load(kI, pixels + i);

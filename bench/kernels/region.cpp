@@ -9,7 +9,6 @@
 
 #include "mapping/region_query.h"
 #include "mapping/region_surface.h"
-#include "mapping/vdb_views.h"
 
 namespace {
 using namespace felt;

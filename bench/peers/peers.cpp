@@ -24,10 +24,8 @@ using bench::Settings;
 
 class Feltmap final : public Engine {
 public:
-  explicit Feltmap(const Settings& s, DistanceModel distance = DistanceModel::optical_axis)
-      : map_(s.voxel_size_m, s.truncation_m) {
+  explicit Feltmap(const Settings& s) : map_(s.voxel_size_m, s.truncation_m) {
     config_.max_depth_m = float(s.max_depth_m);
-    config_.distance = distance;
   }
   std::string name() const override { return "feltmap"; }
   void prepare(const Frame& frame) override {

@@ -9,7 +9,7 @@
 #include "bench/support/bench.h"
 #include "core/simd.h"
 #include "mapping/tsdf_integrator.h"
-#include "mapping/vdb_views.h"
+#include "mapping/vdb_state.h"
 
 namespace {
 
@@ -42,9 +42,12 @@ Cost fuse_all(const std::vector<Frame>& frames, double voxel_size_m, size_t thre
     }
     cost.blocks_per_frame = double(blocks) / double(frames.size());
     cost.blocks = map.store.size();
-    if (repetition == 0)
-      cost.stock_bytes_per_voxel = double(tsdf_grid(map)->memUsage() + weight_grid(map)->memUsage()) /
-                                   double(tsdf_grid(map)->tree().leafCount() * kBlockVoxels);
+    if (repetition == 0) {
+      const BlockList observed = block_lists(map).observed;
+      cost.stock_bytes_per_voxel = double(stock_grid(tsdf_grid(map, observed))->memUsage() +
+                                          stock_grid(weight_grid(map, observed))->memUsage()) /
+                                   double(observed.blocks->size() * kBlockVoxels);
+    }
     cost.bytes_per_voxel = double(map.store.geometry_bytes()) / double(map.store.size() * kBlockVoxels);
   }
   const auto ms = [](std::vector<double> s) { return 1e3 * bench::median(std::move(s)); };
@@ -53,6 +56,31 @@ Cost fuse_all(const std::vector<Frame>& frames, double voxel_size_m, size_t thre
   cost.first_third_ms = ms({total.begin(), total.begin() + third});
   cost.last_third_ms = ms({total.end() - third, total.end()});
   return cost;
+}
+
+/// What the choice of distance costs: one thread, 2 cm, depth only, models in turn within every repetition.
+void compare_distances(const std::vector<Frame>& frames) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+  const char* const names[] = {"optical axis", "ray", "tangent plane"};
+  std::vector<double> best[3];
+  for (auto& times : best) times.assign(frames.size(), 1e9);
+  constexpr int kRepetitions = 7;
+  for (int repetition = 0; repetition < kRepetitions; ++repetition)
+    for (int model = 0; model < 3; ++model) {
+      Map map(0.02, 0.08);
+      IntegrationScratch scratch;
+      IntegrationConfig config;
+      config.distance = DistanceModel(model);
+      for (size_t n = 0; n < frames.size(); ++n) {
+        const FrameStats stats = integrate(map, frames[n], config, scratch);
+        best[model][n] = std::min(best[model][n], stats.allocate_s + stats.fuse_s);
+      }
+    }
+  std::printf("| distance, 2 cm, one thread, depth only | frame ms | times the optical axis |\n|---|---|---|\n");
+  const double axis = bench::median(best[0]);
+  for (int model = 0; model < 3; ++model)
+    std::printf("| %s | %.3f | %.3f |\n", names[model], 1e3 * bench::median(best[model]),
+                bench::median(best[model]) / axis);
 }
 
 /// Least time for the memory traffic of one frame: every depth pixel once, tsdf and weight of each block in view read
@@ -91,8 +119,8 @@ int main(int argc, char** argv) {
   std::vector<Frame> colored = bench::decoded(argc > 1 ? argv[1] : "7scenes_redkitchen");
   std::vector<Frame> frames = colored;
   for (Frame& frame : frames) frame.color = {};
-  std::printf("%zu frames of %dx%d, SIMD %s, weights constant, distance along the optical axis, depth to 4 m\n",
-              frames.size(), frames[0].depth_m.width(), frames[0].depth_m.height(), simd_name().c_str());
+  std::printf("%zu frames of %dx%d, SIMD %s, weights constant, default distance, depth to 4 m\n", frames.size(),
+              frames[0].depth_m.width(), frames[0].depth_m.height(), simd_name().c_str());
   std::printf(
       "| voxel | threads | colour | allocate ms | fuse ms | frame ms | first third | last third | blocks a frame | "
       "ns/voxel | map blocks | bytes/voxel | as two FloatGrids |\n");
@@ -112,4 +140,5 @@ int main(int argc, char** argv) {
   const double bound = bound_ms(frames, blocks_at_2cm);
   std::printf("2 cm, depth only: %.3f ms a frame, bound %.3f ms: %.1f times the bound; two threads %.2f times one\n",
               one_thread, bound, one_thread / bound, one_thread / two_threads);
+  compare_distances(frames);
 }

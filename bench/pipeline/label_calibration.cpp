@@ -74,17 +74,31 @@ Experiment recorded_network(const std::string& name, const std::string& labels, 
   return e;
 }
 
+std::vector<double> class_share(const std::vector<Frame>& frames, const ClassTable& classes) {
+  std::vector<double> share(size_t(classes.size()));
+  for (const Frame& frame : frames)
+    for (const uint16_t id : frame.labels)
+      if (const uint16_t slot = classes.slot_of_id(id); slot != ClassTable::kNoSlot) share[slot] += 1;
+  const double sum = std::accumulate(share.begin(), share.end(), 0.0);
+  for (double& s : share) s /= sum;
+  return share;
+}
+
+/// `sharpness` 0: labels only; else its three greatest probabilities to that power, 1: calibrated, above: too sure.
 Experiment simulated_network(const std::vector<Frame>& frames, const ClassTable& classes, const std::string& preset,
-                             ErrorScale scale, const std::string& scale_name) {
+                             ErrorScale scale, const std::string& scale_name, double sharpness = 0) {
   Experiment e;
   e.name = "house, " + preset + " network, mistakes by " + scale_name;
+  if (sharpness > 0) e.name += sharpness > 1 ? ", top-3 probabilities too sure" : ", top-3 probabilities";
   e.classes = classes;
-  const LabelNetwork network{preset_confusion(preset, classes), scale};
+  LabelNetwork network{preset_confusion(preset, classes), scale};
+  if (sharpness > 0) network.top = 3, network.sharpness = sharpness, network.class_share = class_share(frames, classes);
   for (size_t i = 0; i < frames.size(); ++i) {
     if (i % 4 == 3) continue;
     Frame frame = frames[i];
     LabelImage truth = frame.labels;
-    frame.labels = run_network(network, classes, truth, frame.instances, 1, frame.index).labels;
+    NetworkOutput output = run_network(network, classes, truth, frame.instances, 1, frame.index);
+    frame.labels = std::move(output.labels), frame.probabilities = std::move(output.probabilities);
     frame.instances = {};
     add(e, i, std::move(frame), std::move(truth));
   }
@@ -143,37 +157,74 @@ Scores score(const Experiment& e, const Map& map) {
   return {double(right) / double(all), scores.ece(), scores.brier(), scores.nll()};
 }
 
-std::vector<Settings> all_settings(double k) {
-  std::vector<Settings> all;
-  const auto with = [&](const std::string& name, const std::function<void(Settings&)>& change) {
-    Settings s{name, {}, 1, false};
-    s.labels.max_evidence = 0, s.labels.evidence = 1;
-    change(s);
-    all.push_back(s);
+/// Every remedy against over-confidence beside none, for each way to count.
+std::vector<Settings> all_settings(double k, bool confusion_too) {
+  struct Counting {
+    std::string name;
+    double prior;
+    bool confusion;
   };
-  with("one-hot, no cap (the paper)", [](Settings&) {});
-  for (const double prior : {0.1, 1 / k}) {
-    with("prior " + std::to_string(prior).substr(0, 5), [&](Settings& s) { s.prior = prior; });
+  std::vector<Counting> countings = {{"prior 1", 1, false}, {"prior 0.1", 0.1, false}, {"prior 1/k", 1 / k, false}};
+  if (confusion_too) {
+    countings.push_back({"confusion matrix, prior 1", 1, true});
+    countings.push_back({"confusion matrix, prior 1/k", 1 / k, true});
   }
-  for (const float evidence : {0.1f, 0.3f})
-    with("evidence " + std::to_string(evidence).substr(0, 3), [&](Settings& s) { s.labels.evidence = evidence; });
-  for (const float cap : {5.0f, 10.0f, 20.0f, 50.0f})
-    with("cap " + std::to_string(int(cap)), [&](Settings& s) { s.labels.max_evidence = cap; });
-  for (const float cap : {5.0f, 10.0f, 20.0f, 50.0f})
-    with("prior 0.1, cap " + std::to_string(int(cap)),
-         [&](Settings& s) { s.prior = 0.1, s.labels.max_evidence = cap; });
-  with("novelty 0.1 m, 10 deg", [](Settings& s) { s.labels.novelty_m = 0.1f, s.labels.novelty_deg = 10; });
-  with("confusion", [](Settings& s) { s.confusion = true; });
-  with("confusion, prior 0.1", [](Settings& s) { s.confusion = true, s.prior = 0.1; });
-  for (const float cap : {10.0f, 20.0f, 50.0f})
-    with("confusion, prior 0.1, cap " + std::to_string(int(cap)),
-         [&](Settings& s) { s.confusion = true, s.prior = 0.1, s.labels.max_evidence = cap; });
-  with("confusion, prior 1/k", [&](Settings& s) { s.confusion = true, s.prior = 1 / k; });
-  with("confusion, prior 0.1, novelty", [](Settings& s) {
-    s.confusion = true, s.prior = 0.1;
-    s.labels.novelty_m = 0.1f, s.labels.novelty_deg = 10;
-  });
+  std::vector<Settings> all;
+  for (const Counting& c : countings) {
+    const auto with = [&](const std::string& remedy, const std::function<void(LabelConfig&)>& change) {
+      Settings s{c.name + remedy, {}, c.prior, c.confusion};
+      s.labels.max_evidence = 0, s.labels.evidence = 1;
+      change(s.labels);
+      all.push_back(s);
+    };
+    with("", [](LabelConfig&) {});
+    if (c.prior == 0.1) continue;
+    for (const float evidence : {0.1f, 0.3f})
+      with(", evidence " + std::to_string(evidence).substr(0, 3), [&](LabelConfig& l) { l.evidence = evidence; });
+    for (const float cap : {5.0f, 10.0f, 20.0f, 50.0f})
+      with(", cap " + std::to_string(int(cap)), [&](LabelConfig& l) { l.max_evidence = cap; });
+    with(", novelty 0.1 m, 10 deg", [](LabelConfig& l) { l.novelty_m = 0.1f, l.novelty_deg = 10; });
+  }
   return all;
+}
+
+void print(const std::string& name, const Scores& s) {
+  std::printf("| %s | %.3f | %.3f | %.3f | %.3f |\n", name.c_str(), s.accuracy, s.ece, s.brier, s.nll);
+  std::fflush(stdout);
+}
+
+/// The network's own probabilities on the held-out frames, what is not named spread over the other classes.
+Scores score_frames(const Experiment& e) {
+  CalibrationScores scores;
+  uint64_t right = 0, all = 0;
+  const int k = e.classes.size();
+  std::vector<double> p(static_cast<size_t>(k));
+  for (size_t n = 0; n < e.held_out.size(); ++n) {
+    const ProbabilityImage& image = e.held_out[n].probabilities;
+    for (int v = 0; v < image.height; v += kSmaller)
+      for (int u = 0; u < image.width; u += kSmaller) {
+        const uint16_t truth = e.classes.slot_of_id(e.held_out_truth[n](u, v));
+        if (truth == ClassTable::kNoSlot) continue;
+        std::fill(p.begin(), p.end(), -1.0);
+        double rest = 1;
+        int unnamed = k;
+        for (int i = 0; i < image.top; ++i) {
+          const size_t at = (size_t(v) * size_t(image.width) + size_t(u)) * size_t(image.top) + size_t(i);
+          const uint16_t slot = e.classes.slot_of_id(image.class_id[at]);
+          if (slot == ClassTable::kNoSlot || !(image.probability[at] > 0) || p[slot] >= 0) continue;
+          p[slot] = double(image.probability[at]);
+          rest -= p[slot], --unnamed;
+        }
+        if (unnamed == k) continue;
+        double sum = 0;
+        for (double& x : p) sum += x = x >= 0 ? x : std::max(0.0, rest) / unnamed;
+        for (double& x : p) x /= sum;
+        scores.add(p, truth);
+        right += size_t(std::max_element(p.begin(), p.end()) - p.begin()) == truth;
+        ++all;
+      }
+  }
+  return {double(right) / double(all), scores.ece(), scores.brier(), scores.nll()};
 }
 
 void run(Experiment e) {
@@ -187,14 +238,12 @@ void run(Experiment e) {
   std::printf("\n%s: %d classes, %zu frames build, %zu held out\n\n", e.name.c_str(), e.classes.size(),
               e.building.size(), e.held_out.size());
   std::printf("| settings | accuracy | ECE | Brier | NLL |\n|---|---|---|---|---|\n");
-  std::printf("| the network's single frames, through its confusion matrix | %.3f | %.3f | %.3f | %.3f |\n",
-              frame.accuracy, frame.ece, frame.brier, frame.nll);
-  for (const Settings& s : all_settings(e.classes.size())) {
-    const Scores scores = score(e, fused(e, s, &likelihood));
-    std::printf("| %s | %.3f | %.3f | %.3f | %.3f |\n", s.name.c_str(), scores.accuracy, scores.ece, scores.brier,
-                scores.nll);
-    std::fflush(stdout);
-  }
+  print("single frames, through the confusion matrix", {frame.accuracy, frame.ece, frame.brier, frame.nll});
+  const bool soft = !e.held_out[0].probabilities.empty();
+  if (soft) print("single frames, as the network says", score_frames(e));
+  // What a calibrated distribution says of the true class it has already said.
+  for (const Settings& s : all_settings(e.classes.size(), !soft || e.building[0].probabilities.top == 1))
+    print(s.name, score(e, fused(e, s, &likelihood)));
 }
 
 }  // namespace
@@ -214,5 +263,7 @@ int main(int argc, char** argv) {
       run(simulated_network(frames, classes, preset, ErrorScale::segment, "thing and frame"));
     run(simulated_network(frames, classes, "medium", ErrorScale::pixel, "pixel"));
     run(simulated_network(frames, classes, "medium", ErrorScale::scene, "thing in all frames"));
+    run(simulated_network(frames, classes, "medium", ErrorScale::segment, "thing and frame", 1));
+    run(simulated_network(frames, classes, "medium", ErrorScale::segment, "thing and frame", 3));
   }
 }

@@ -106,7 +106,7 @@ void measure(const Map& map, MapCompression compression, const char* name, const
     require_same(load_map(path), map);
     // OpenVDB alone: the same grids, made beforehand.
     openvdb::GridPtrVec grids;
-    for (const MapGrid& grid : views ? map_grids(map) : state_grids(map)) grids.push_back(grid.make());
+    for (const LeafGrid& grid : views ? map_grids(map) : state_grids(map)) grids.push_back(stock_grid(grid));
     const double write_s = median_of_five_s([&] {
       std::ofstream os(stock, std::ios::binary);
       openvdb::io::Stream stream(os);

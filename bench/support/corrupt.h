@@ -1,10 +1,13 @@
 #pragma once
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <numeric>
 #include <random>
 #include <string>
@@ -26,8 +29,12 @@ struct Copy {
   std::vector<int64_t> number;
   std::vector<double> stamp_s;
   std::vector<Eigen::Isometry3d> pose;
-  fs::path base;                               ///< holds the sound images
-  std::function<void(Frame&)> change_frame{};  ///< images are written anew where set
+  fs::path base;       ///< holds the sound images
+  bool views = false;  ///< taken one by one by a camera at rest: between two of them nothing is known to move steadily
+  // Images of one kind are written anew where their change is set.
+  std::function<void(DepthImage&)> change_depth{};
+  std::function<void(ColorImage&)> change_color{};
+  std::function<void(LabelImage&)> change_labels{};
   std::function<uint16_t(uint16_t)> change_stored_depth{};
   std::vector<int64_t> without_depth{};
   std::vector<std::pair<int64_t, int64_t>> repeated{};  ///< image of the first replaces that of the second
@@ -92,42 +99,44 @@ inline void write(const Copy& copy, const fs::path& out, bool with_stamps = fals
       for (int column = 0; column < 4; ++column) poses << ' ' << copy.pose[i].matrix()(row, column);
     poses << '\n';
   }
-  const bool depth_anew =
-      copy.change_frame || copy.change_stored_depth || !copy.without_depth.empty() || !copy.repeated.empty();
-  for (const char* name : {"color", "labels", "probs", "instances", "classes.yaml"})
-    if (fs::exists(copy.base / name) && !(copy.change_frame && name != std::string("classes.yaml")))
+  const bool depth_written = copy.change_depth || copy.change_stored_depth,
+             depth_listed = !copy.without_depth.empty() || !copy.repeated.empty();
+  const std::map<std::string, bool> written = {{"depth", depth_written || depth_listed},
+                                               {"color", bool(copy.change_color)},
+                                               {"labels", bool(copy.change_labels)},
+                                               {"probs", false},
+                                               {"instances", false},
+                                               {"classes.yaml", false}};
+  for (const auto& [name, anew] : written) {
+    if (!fs::exists(copy.base / name)) continue;
+    if (anew)
+      fs::create_directories(out / name);
+    else
       fs::create_symlink(copy.base / name, out / name);
-  if (!depth_anew) {
-    fs::create_symlink(copy.base / "depth", out / "depth");
-    return;
   }
-  fs::create_directories(out / "depth");
-  if (copy.change_frame) {
-    const auto reader = open_sequence(copy.base);
-    for (const char* name : {"color", "labels"})
-      if (fs::exists(copy.base / name)) fs::create_directories(out / name);
-    for (int64_t i = 0; i < reader->size(); ++i) {
+  if (depth_written || copy.change_color || copy.change_labels) {
+    const auto reader = open_sequence(copy.base, {.read_color = bool(copy.change_color), .read_instances = false});
+    tbb::parallel_for(int64_t(0), reader->size(), [&](int64_t i) {
       auto frame = std::get<Frame>(reader->read(i));
-      copy.change_frame(frame);
-      int64_t lost = 0;
       const std::string name = stem(frame.index) + ".png";
-      write_bytes(out / "depth" / name, encode_png(stored_depth(frame.depth_m, copy.depth_scale, lost)));
-      if (!frame.color.empty()) write_bytes(out / "color" / name, encode_png(frame.color));
-      if (!frame.labels.empty()) write_bytes(out / "labels" / name, encode_png(frame.labels));
-    }
-    return;
-  }
-  if (copy.change_stored_depth) {
-    const auto reader = open_sequence(copy.base, {.read_color = false});
-    for (int64_t i = 0; i < reader->size(); ++i) {
-      const auto frame = std::get<Frame>(reader->read(i));
+      if (copy.change_color) {
+        copy.change_color(frame.color);
+        write_bytes(out / "color" / name, encode_png(frame.color));
+      }
+      if (copy.change_labels) {
+        copy.change_labels(frame.labels);
+        write_bytes(out / "labels" / name, encode_png(frame.labels));
+      }
+      if (!depth_written) return;
+      if (copy.change_depth) copy.change_depth(frame.depth_m);
       int64_t lost = 0;
       Image<uint16_t> stored = stored_depth(frame.depth_m, copy.depth_scale, lost);
-      for (uint16_t& value : stored) value = copy.change_stored_depth(value);
-      write_bytes(out / "depth" / (stem(frame.index) + ".png"), encode_png(stored));
-    }
-    return;
+      if (copy.change_stored_depth)
+        for (uint16_t& value : stored) value = copy.change_stored_depth(value);
+      write_bytes(out / "depth" / name, encode_png(stored));
+    });
   }
+  if (!depth_listed) return;
   for (const int64_t number : copy.number) {
     if (std::count(copy.without_depth.begin(), copy.without_depth.end(), number) > 0) continue;
     int64_t source = number;
@@ -169,17 +178,17 @@ inline std::vector<Fault> faults() {
       {"ray length", "depth-along",
        [](Copy& c) {
          const PinholeCamera camera = c.camera;
-         c.change_frame = [camera](Frame& frame) {
+         c.change_depth = [camera](DepthImage& depth_m) {
            for (int v = 0; v < camera.height; ++v)
-             for (int u = 0; u < camera.width; ++u) frame.depth_m(u, v) *= float(camera.ray(u, v).norm());
+             for (int u = 0; u < camera.width; ++u) depth_m(u, v) *= float(camera.ray(u, v).norm());
          };
          return true;
        }},
       {"BGR", "color-order",
        [](Copy& c) {
          if (!fs::exists(c.base / "color")) return false;
-         c.change_frame = [](Frame& frame) {
-           for (Rgba8& pixel : frame.color) std::swap(pixel.r, pixel.b);
+         c.change_color = [](ColorImage& color) {
+           for (Rgba8& pixel : color) std::swap(pixel.r, pixel.b);
          };
          return true;
        }},
@@ -193,7 +202,8 @@ inline std::vector<Fault> faults() {
          }
          if (poses.size() < 8) return false;
          std::nth_element(steps.begin(), steps.begin() + steps.size() / 2, steps.end());
-         // Single views with minutes between them have no motion to interpolate.
+         // Views with minutes between them have no motion to interpolate.
+         if (c.views) return false;
          if (*std::max_element(steps.begin(), steps.end()) > 5 * steps[steps.size() / 2]) return false;
          Copy moved = c;
          moved.number.clear(), moved.stamp_s.clear(), moved.pose.clear();
@@ -217,8 +227,8 @@ inline std::vector<Fault> faults() {
       {"labels plus one", "labels",
        [](Copy& c) {
          if (!fs::exists(c.base / "labels") || !fs::exists(c.base / "classes.yaml")) return false;
-         c.change_frame = [](Frame& frame) {
-           for (uint16_t& id : frame.labels) id = uint16_t(id + 1);
+         c.change_labels = [](LabelImage& labels) {
+           for (uint16_t& id : labels) id = uint16_t(id + 1);
          };
          return true;
        }},

@@ -43,6 +43,21 @@ std::optional<Eigen::Isometry3d> recorded_at(const RecordedTrajectory& trajector
 /// Depth along the axis per depth along the ray.
 double axis_share(const PinholeCamera& camera, double u, double v) { return 1 / camera.ray(u, v).norm(); }
 
+/// Depth of the surface that b saw at the real pixel (x, y), 0 where nothing was measured. Between four pixels of one
+/// surface inverse depth is linear, which is exact for planes: the nearest pixel alone is wrong by more than a sensor
+/// where floors run away from the camera, and readings that move the camera less would win for needing it less.
+double depth_between(const DepthImage& depth_m, double x, double y) {
+  const double nearest = depth_m(int(std::floor(x + 0.5)), int(std::floor(y + 0.5)));
+  const int u = int(std::floor(x)), v = int(std::floor(y));
+  if (u < 0 || v < 0 || u + 1 >= depth_m.width() || v + 1 >= depth_m.height()) return nearest;
+  const float *above = depth_m.row(v) + u, *below = depth_m.row(v + 1) + u;
+  const auto [least, most] = std::minmax({above[0], above[1], below[0], below[1]});
+  constexpr float kOneSurface = 1.1f;
+  if (!(least > 0) || most > kOneSurface * least) return nearest;
+  const double a = x - u, b = y - v;
+  return 1 / ((1 - b) * ((1 - a) / above[0] + a / above[1]) + b * ((1 - a) / below[0] + a / below[1]));
+}
+
 PairScore score_pair(const SampledFrame& a, const SampledFrame& b, const Eigen::Isometry3d& T_b_a,
                      const PinholeCamera& camera, const Reading& reading, size_t every) {
   PairScore result;
@@ -58,9 +73,9 @@ PairScore score_pair(const SampledFrame& a, const SampledFrame& b, const Eigen::
     const Eigen::Vector3d p = T_b_a * (z * camera.ray(point.u, point.v));
     if (p.z() <= 0) continue;
     const Eigen::Vector2d pixel = camera.project(p);
-    const double x = std::floor(pixel.x() + 0.5), y = std::floor(pixel.y() + 0.5);
-    if (!(x >= 0 && y >= 0 && x < camera.width && y < camera.height)) continue;
-    double depth = b.depth_m(int(x), int(y)) * reading.depth_factor;
+    const double x = pixel.x(), y = pixel.y();
+    if (!(x >= -0.5 && y >= -0.5 && x < camera.width - 0.5 && y < camera.height - 0.5)) continue;
+    double depth = depth_between(b.depth_m, x, y) * reading.depth_factor;
     if (depth <= 0) continue;
     if (reading.ray_length) depth *= axis_share(camera, x, y);
     const double residual = p.z() / depth - 1;

@@ -65,7 +65,8 @@ Examination examine_sequence(const fs::path& path, const SequenceOptions& option
   const Reading best = best_reading(sample.geometry, true);
   if (sample.geometry.pairs.size() >= 2) {
     append(examination.findings, geometry_findings(sample.geometry, best, true));
-    examination.findings.push_back(check_trajectory(sample.geometry, best, *plain_reader(path, options, listing)));
+    examination.findings.push_back(
+        check_trajectory(sample.geometry, best, *plain_reader(path, options, listing, Images::depth)));
   }
   if (auto finding = check_color_order(sample.geometry.frames, listing.classes))
     examination.findings.push_back(std::move(*finding));

@@ -36,15 +36,7 @@ Roughness roughness_of(const DepthImage& depth, int width) {
 /// Depth of a few frames spread over the sequence.
 std::vector<DepthImage> few_depths(const std::filesystem::path& path, const SequenceOptions& options,
                                    const SequenceListing& listing) {
-  SequenceOptions depth_only = options;
-  depth_only.read_color = false;
-  SequenceListing bare = listing;
-  for (FrameRecord& frame : bare.frames) {
-    frame.color = frame.labels = frame.instances = frame.probabilities = {};
-    frame.masks.clear();
-    frame.class_maps.clear();
-  }
-  const auto reader = plain_reader(path, depth_only, std::move(bare));
+  const auto reader = plain_reader(path, options, listing, Images::depth);
   std::vector<DepthImage> depths;
   const int64_t step = std::max<int64_t>(1, reader->size() / 8);
   for (int64_t i = 0; i < reader->size() && depths.size() < 4; i += step) {

@@ -30,6 +30,7 @@ uint64_t bytes_of(const ImageSource& source) {
 
 /// True where both sources hold the same bytes.
 bool same_bytes(const ImageSource& a, const ImageSource& b) {
+  if (a.face != b.face) return false;  // the four views of a scan come from one file
   const uint64_t size = bytes_of(a);
   if (size == 0 || size != bytes_of(b)) return false;
   std::ifstream file_a(a.path, std::ios::binary), file_b(b.path, std::ios::binary);

@@ -9,21 +9,25 @@ namespace {
 
 /// Score that each change from the reading as it is has to earn: the sequence is taken at its word unless it errs.
 constexpr double kCostOfChange = 0.02;
+/// Score by which a right focal length, scale or delay raises a reading at most that is right in all else.
+constexpr double kOvertakes = 1;
 
 class Search {
 public:
   Search(const GeometrySample& sample) : sample_(sample) {}
 
-  std::vector<PairScore> scores(const Reading& reading) const {
-    return cross_project(sample_.frames, sample_.pairs, sample_.trajectory, sample_.camera, reading, 3);
-  }
-  double value(const Reading& r) const {
+  /// Every n-th point is projected.
+  enum Fineness { coarse = 9, fine = 3 };
+
+  double value(const Reading& r, Fineness every = fine) const {
     const Reading& now = sample_.now;
     const int changes = (r.convention.world_to_camera != now.convention.world_to_camera) +
                         (r.convention.opengl_axes != now.convention.opengl_axes) + (r.depth_factor != 1) +
                         (r.ray_length != now.ray_length) + (r.focal_factor != 1) + r.swapped_camera +
                         (r.pose_delay != 0);
-    return mean_score(scores(r), sample_.median_depth_m * r.depth_factor) - kCostOfChange * changes -
+    const std::vector<PairScore> scores =
+        cross_project(sample_.frames, sample_.pairs, sample_.trajectory, sample_.camera, r, every);
+    return mean_score(scores, sample_.median_depth_m * r.depth_factor) - kCostOfChange * changes -
            4 * off_center(camera_of(sample_.camera, r));
   }
 
@@ -41,21 +45,22 @@ struct Candidate {
   double value = 0;
 };
 
-/// Changes one number of the reading by a sweep, then halves the step around the best.
-Candidate swept(const Search& search, Candidate best, double Reading::*number, const std::vector<double>& values,
-                bool logarithmic) {
-  const double start = best.reading.*number;
-  double step = 0;
+/// Changes one number of the reading by a sweep over few points, then halves the step around the best with more.
+Candidate swept(const Search& search, const Candidate& start, double Reading::*number,
+                const std::vector<double>& values, bool logarithmic) {
+  Reading coarse = start.reading;
+  double coarse_value = search.value(coarse, Search::coarse), step = 0;
   for (size_t i = 0; i < values.size(); ++i) {
-    Candidate next = best;
-    next.reading.*number = values[i];
-    next.value = search.value(next.reading);
-    if (next.value <= best.value) continue;
-    best = next;
+    Reading next = start.reading;
+    next.*number = values[i];
+    const double value = search.value(next, Search::coarse);
+    if (value <= coarse_value) continue;
+    coarse = next, coarse_value = value;
     const double other = values[i > 0 ? i - 1 : i + 1];
     step = logarithmic ? std::abs(std::log(values[i] / other)) : std::abs(values[i] - other);
   }
-  if (best.reading.*number == start) return best;
+  if (coarse == start.reading) return start;
+  Candidate best{coarse, search.value(coarse)};
   for (int halving = 0; halving < 5; ++halving) {
     step /= 2;
     const double middle = best.reading.*number;
@@ -66,7 +71,7 @@ Candidate swept(const Search& search, Candidate best, double Reading::*number, c
       if (next.value > best.value) best = next;
     }
   }
-  return best;
+  return best.value > start.value ? best : start;
 }
 
 std::vector<double> geometric(double from, double to, int steps) {
@@ -159,6 +164,9 @@ Reading best_reading(const GeometrySample& sample, bool thorough) {
   const Candidate as_is = candidates.front();
   std::stable_sort(candidates.begin(), candidates.end(), better);
   if (thorough) {
+    // What fits much worse than the best does not overtake it by a number.
+    const double least = candidates.front().value - kOvertakes;
+    std::erase_if(candidates, [&](const Candidate& c) { return c.value < least || c.reading == as_is.reading; });
     candidates.resize(std::min<size_t>(candidates.size(), 3));
     candidates.push_back(as_is);
     for (Candidate& candidate : candidates) candidate = refined(search, candidate, sample);

@@ -15,6 +15,8 @@ namespace {
 
 /// Measured pixels that one frame is projected with.
 constexpr int kPointsAFrame = 700;
+/// Frames, at least, whose colour is looked at.
+constexpr size_t kColorFrames = 10;
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -73,10 +75,18 @@ RecordedTrajectory recorded_trajectory(const SequenceListing& listing) {
 }
 
 std::unique_ptr<SequenceReader> plain_reader(const std::filesystem::path& path, const SequenceOptions& options,
-                                             SequenceListing listing) {
+                                             SequenceListing listing, Images images) {
   SequenceOptions all = options;
   all.frames = {};
+  all.read_color &= images == Images::all;
+  all.read_instances = false;
   listing.depth_is_ray_length = false;
+  for (FrameRecord& frame : listing.frames) {
+    // Nothing that the doctor looks at.
+    frame.probabilities = {};
+    frame.class_maps.clear();
+    if (images == Images::depth) frame.labels = {};
+  }
   return make_listed_sequence(path, all, std::move(listing));
 }
 
@@ -104,9 +114,8 @@ Sample take_sample(const std::filesystem::path& path, const SequenceOptions& opt
                    const SamplePlan& plan) {
   Sample sample;
   GeometrySample& geometry = sample.geometry;
-  SequenceOptions reading = options;
-  reading.read_color = plan.images && options.read_color;
-  const auto reader = plain_reader(path, reading, listing);
+  const auto reader = plain_reader(path, options, listing, plan.images ? Images::depth_and_labels : Images::depth),
+             color_reader = plain_reader(path, options, listing, Images::all);
   geometry.camera = reader->info().camera;
   geometry.now.convention = listing.pose_convention;
   geometry.now.ray_length = listing.depth_is_ray_length;
@@ -118,8 +127,11 @@ Sample take_sample(const std::filesystem::path& path, const SequenceOptions& opt
   const std::vector<int64_t> positions = sampled_positions(count, plan);
   std::vector<std::optional<SampledFrame>> frames(positions.size());
   std::vector<std::string> reasons(positions.size());
+  // The balance of colours needs some views only, and colour takes longest to decode.
+  const size_t color_step = std::max<size_t>(1, positions.size() / kColorFrames);
   tbb::parallel_for(size_t(0), positions.size(), [&](size_t i) {
-    ReadResult result = reader->read(positions[i]);
+    const bool with_color = plan.images && i % color_step == 0;
+    ReadResult result = (with_color ? color_reader : reader)->read(positions[i]);
     if (auto* frame = std::get_if<Frame>(&result))
       frames[i] = sampled_frame(std::move(*frame), positions[i]);
     else

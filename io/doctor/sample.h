@@ -31,9 +31,12 @@ Sample take_sample(const std::filesystem::path& path, const SequenceOptions& opt
 /// Poses of all frames that have one.
 RecordedTrajectory recorded_trajectory(const SequenceListing& listing);
 
+/// What of a frame is decoded.
+enum class Images { depth, depth_and_labels, all };
+
 /// A reader of all frames of the listing, whose depth is not converted from ray length.
 std::unique_ptr<SequenceReader> plain_reader(const std::filesystem::path& path, const SequenceOptions& options,
-                                             SequenceListing listing);
+                                             SequenceListing listing, Images images);
 
 /// One decoded frame with its points; empty points where there are none.
 SampledFrame sampled_frame(Frame frame, int64_t position);

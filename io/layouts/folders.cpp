@@ -1,10 +1,9 @@
-#include <set>
-
 #include "core/error.h"
 #include "io/camera_file.h"
 #include "io/class_table_file.h"
 #include "io/layouts.h"
 #include "io/layouts/file_names.h"
+#include "io/layouts/frame_files.h"
 #include "io/side_images.h"
 
 // Exports with a folder for each kind of file and one pose file a frame: ICL-NUIM as fused by many, ScanNet's exporter.
@@ -19,7 +18,7 @@ const std::vector<std::string> kDepthCamera = {"intrinsic/intrinsic_depth.txt", 
                                kTables = {"classes.yaml", "labels_40.csv", "classes.csv"};
 
 bool has_frames(const fs::path& path) {
-  return has_numbered_file(path / "depth", "", {".png"}) && has_numbered_file(path / "pose", "", {".txt"});
+  return has_depth_files(path / "depth") && has_numbered_file(path / "pose", "", {".txt"});
 }
 bool recognises_scannet(const fs::path& path) {
   return has_frames(path) && !first_existing(path, kDepthCamera).empty();
@@ -28,21 +27,9 @@ bool recognises_icl(const fs::path& path) { return has_frames(path) && first_exi
 
 SequenceListing list_frames(const fs::path& path) {
   SequenceListing listing;
-  const auto depth = numbered_files(path / "depth", "", {".png"}),
-             color = numbered_files(path / "color", "", {".jpg", ".png", ".jpeg"}),
-             pose = numbered_files(path / "pose", "", {".txt"});
-  std::set<int64_t> numbers;
-  for (const auto* files : {&depth, &color, &pose})
-    for (const auto& [number, file] : *files) numbers.insert(number);
-  for (const int64_t number : numbers) {
-    FrameRecord frame;
-    frame.index = number;
-    frame.stamp_s = double(number);
-    frame.depth.path = at_number(depth, number);
-    frame.color.path = at_number(color, number);
-    frame.pose_file = at_number(pose, number);
-    listing.frames.push_back(std::move(frame));
-  }
+  listing.frames = frame_records({.depth = depth_files(path / "depth"),
+                                  .color = numbered_files(path / "color", "", {".jpg", ".png", ".jpeg"}),
+                                  .pose = numbered_files(path / "pose", "", {".txt"})});
   if (const fs::path labels = first_existing(path, kLabelFolders); !labels.empty()) attach_labels(labels, listing);
   if (const fs::path table = first_existing(path, kTables); !table.empty()) listing.classes = read_class_table(table);
   return listing;

@@ -9,8 +9,10 @@
 #include "io/class_table_file.h"
 #include "io/layouts.h"
 #include "io/layouts/file_names.h"
+#include "io/layouts/frame_files.h"
 #include "io/text_input.h"
 #include "io/trajectory_file.h"
+#include "io/yaml_problems.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -19,9 +21,9 @@ namespace {
 bool recognises(const fs::path& path) { return fs::exists(path / "sequence.yaml"); }
 
 /// Reads `sequence.yaml`, gathering every problem.
-class Settings {
+class Settings : public YamlProblems {
 public:
-  Settings(const YAML::Node& root, const fs::path& file) : root_(root), file_(file) {}
+  Settings(const YAML::Node& root, const fs::path& file) : YamlProblems(file), root_(root) {}
 
   std::string text(const char* key, const std::string& otherwise) {
     const YAML::Node node = root_[key];
@@ -53,24 +55,9 @@ public:
             "something else");
     return {};
   }
-  void problem(const YAML::Node& node, const std::string& key, const std::string& expected, const std::string& found) {
-    problems.push_back(
-        describe_mismatch(file_.string() + ":" + std::to_string(node.Mark().line + 1), key, expected, found));
-  }
-  void refuse_unknown(const YAML::Node& node, const std::set<std::string>& known) {
-    std::string names;
-    for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
-    for (const auto& entry : node)
-      if (!entry.first.IsScalar() || !known.contains(entry.first.Scalar()))
-        problem(entry.first, "key", "one of " + names,
-                entry.first.IsScalar() ? "'" + entry.first.Scalar() + "'" : "a list");
-  }
-
-  std::vector<std::string> problems;
 
 private:
   const YAML::Node& root_;
-  const fs::path& file_;
 };
 
 void read_settings(const fs::path& file, SequenceListing& listing, std::map<std::string, std::string>& paths) {
@@ -111,6 +98,7 @@ void read_settings(const fs::path& file, SequenceListing& listing, std::map<std:
   listing.T_body_camera = rigid("T_body_camera");
   listing.T_color_depth = rigid("T_color_depth").matrix();
   listing.depth_scale = settings.positive(root, "depth_scale", 1000);
+  listing.depth_scale_stated = bool(root["depth_scale"]);
   if (const YAML::Node flag = root["depth_is_ray_length"];
       flag && !YAML::convert<bool>::decode(flag, listing.depth_is_ray_length))
     settings.problem(flag, "depth_is_ray_length", "true or false", "something else");
@@ -144,8 +132,11 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
     throw ConfigError(file.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
   }
   const auto images = [&](const char* key) { return numbered_files(path / paths[key], "", {".png", ".jpg", ".jpeg"}); };
-  const auto depth = images("depth"), color = images("color"), labels = images("labels"), probs = images("probs"),
-             instances = images("instances");
+  const FrameFiles files{.depth = depth_files(path / paths["depth"]),
+                         .color = images("color"),
+                         .labels = images("labels"),
+                         .instances = images("instances"),
+                         .probabilities = images("probs")};
   const std::vector<StampedPose> poses = read_trajectory(path / paths["poses"], true);
 
   // The first column of poses.txt holds frame numbers where all of them name a frame; else stamps, one a frame in
@@ -156,10 +147,10 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
     numbers.push_back(pose.stamp_s);
     by_number &= pose.stamp_s == std::floor(pose.stamp_s) && std::abs(pose.stamp_s) < 1e9;
   }
-  if (!by_number && poses.size() != depth.size())
+  if (!by_number && poses.size() != files.depth.size())
     throw FormatError(describe_mismatch(
         (path / paths["poses"]).string(), "poses",
-        "frame numbers, or a stamp for each of the " + std::to_string(depth.size()) + " depth images in order",
+        "frame numbers, or a stamp for each of the " + std::to_string(files.depth.size()) + " depth images in order",
         std::to_string(poses.size()) + " stamps"));
   const std::vector<bool> disordered = out_of_order(numbers);
   std::map<int64_t, const StampedPose*> pose_of;
@@ -170,23 +161,14 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
         throw FormatError(describe_mismatch((path / paths["poses"]).string() + ":" + std::to_string(pose.line),
                                             "frame number", "each once", std::to_string(other->first) + " again"));
     }
-  std::set<int64_t> all;
-  for (const auto* files : {&depth, &color})
-    for (const auto& [number, image] : *files) all.insert(number);
-  for (const auto& [number, pose] : pose_of) all.insert(number);
+  std::vector<int64_t> posed;
+  for (const auto& [number, pose] : pose_of) posed.push_back(number);
+  listing.frames = frame_records(files, posed);
   listing.stamped = !by_number;
   size_t position = 0;
-  for (const int64_t number : all) {
-    FrameRecord frame;
-    frame.index = number;
-    frame.stamp_s = double(number);
-    frame.depth.path = at_number(depth, number);
-    frame.color.path = at_number(color, number);
-    frame.labels.path = at_number(labels, number);
-    frame.probabilities.path = at_number(probs, number);
-    frame.instances.path = at_number(instances, number);
+  for (FrameRecord& frame : listing.frames) {
     if (by_number) {
-      if (const auto found = pose_of.find(number); found != pose_of.end()) frame.pose = found->second->matrix;
+      if (const auto found = pose_of.find(frame.index); found != pose_of.end()) frame.pose = found->second->matrix;
     } else if (!frame.depth.empty()) {
       frame.stamp_s = poses[position].stamp_s;
       frame.pose = poses[position].matrix;
@@ -197,7 +179,6 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
       }
       ++position;
     }
-    listing.frames.push_back(std::move(frame));
   }
   if (options.classes_file.empty() && fs::exists(path / paths["classes"]))
     listing.classes = read_class_table(path / paths["classes"]);

@@ -2,6 +2,7 @@
 #include "io/camera_file.h"
 #include "io/layouts.h"
 #include "io/layouts/file_names.h"
+#include "io/layouts/frame_files.h"
 #include "io/text_input.h"
 #include "io/trajectory_file.h"
 
@@ -14,7 +15,7 @@ const std::vector<std::string> kTrajectories = {"trajectory.log", "traj.log", "s
                                            "intrinsic.txt"};
 
 bool recognises(const fs::path& path) {
-  return !first_existing(path, kTrajectories).empty() && has_numbered_file(path / "depth", "", {".png"});
+  return !first_existing(path, kTrajectories).empty() && has_depth_files(path / "depth");
 }
 
 /// Open3D's log: per pose a line of three numbers, the first its frame's position, and four lines of a matrix.
@@ -46,25 +47,19 @@ std::vector<StampedPose> read_log(const fs::path& file) {
 
 SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   SequenceListing listing;
-  const auto depth = numbered_files(path / "depth", "", {".png"}),
-             color = numbered_files(fs::exists(path / "color") ? path / "color" : path / "image", "", {".jpg", ".png"});
   const fs::path log = first_existing(path, kTrajectories);
   std::map<int64_t, Eigen::Matrix4d> pose_at;
   for (const StampedPose& pose : read_log(log))
     if (!pose_at.emplace(int64_t(pose.stamp_s), pose.matrix).second)
       throw FormatError(describe_mismatch(log.string() + ":" + std::to_string(pose.line), "frame", "each once",
                                           std::to_string(int64_t(pose.stamp_s)) + " again"));
-  int64_t position = 0;
-  for (const auto& [number, file] : depth) {
-    FrameRecord frame;
-    frame.index = number;
-    frame.stamp_s = double(number);
-    frame.depth.path = file;
-    frame.color.path = at_number(color, number);
-    // The log counts frames from 0, whatever the first file's number is.
-    if (const auto found = pose_at.find(position++); found != pose_at.end()) frame.pose = found->second;
-    listing.frames.push_back(std::move(frame));
-  }
+  const fs::path color_folder = fs::exists(path / "color") ? path / "color" : path / "image";
+  listing.frames = frame_records(
+      {.depth = depth_files(path / "depth"), .color = numbered_files(color_folder, "", {".jpg", ".png"})});
+  // Colour alone is no frame: the log counts depth images from 0, whatever the first one's number is.
+  std::erase_if(listing.frames, [](const FrameRecord& frame) { return frame.depth.empty(); });
+  for (size_t i = 0; i < listing.frames.size(); ++i)
+    if (const auto found = pose_at.find(int64_t(i)); found != pose_at.end()) listing.frames[i].pose = found->second;
   if (const fs::path camera = first_existing(path, kCameras); !camera.empty()) {
     const CameraFile file = read_camera_file(camera);
     if (!options.intrinsics) listing.intrinsics = file.intrinsics;

@@ -1,8 +1,11 @@
+#include <numeric>
+
 #include "core/error.h"
 #include "io/camera_file.h"
 #include "io/class_table_file.h"
 #include "io/layouts.h"
 #include "io/layouts/file_names.h"
+#include "io/layouts/frame_files.h"
 #include "io/trajectory_file.h"
 
 namespace felt {
@@ -13,33 +16,28 @@ namespace {
 constexpr int64_t kMostGaps = 10000;
 
 bool recognises(const fs::path& path) {
-  return fs::exists(path / "traj.txt") && has_numbered_file(path / "results", "depth", {".png"});
+  return fs::exists(path / "traj.txt") && has_depth_files(path / "results", "depth");
 }
 
 SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   SequenceListing listing;
   listing.depth_scale = 6553.5;
-  const auto depth = numbered_files(path / "results", "depth", {".png"}),
-             color = numbered_files(path / "results", "frame", {".jpg", ".png"}),
-             semantic = numbered_files(path / "semantic", "semantic", {".png"}),
-             instance = numbered_files(path / "instance", "instance", {".png"});
+  const FrameFiles files{.depth = depth_files(path / "results", "depth"),
+                         .color = numbered_files(path / "results", "frame", {".jpg", ".png"}),
+                         .labels = numbered_files(path / "semantic", "semantic", {".png"}),
+                         .instances = numbered_files(path / "instance", "instance", {".png"})};
   const std::vector<StampedPose> poses = read_trajectory(path / "traj.txt", false);
   // Line n of traj.txt belongs to frame n, so a frame without images shows as a missing one.
-  const int64_t count = std::max(int64_t(poses.size()), depth.empty() ? 0 : depth.rbegin()->first + 1);
-  if (count > int64_t(poses.size() + depth.size()) + kMostGaps)
+  int64_t count = int64_t(poses.size());
+  for (const auto* kind : {&files.depth, &files.color})
+    if (!kind->empty()) count = std::max(count, kind->rbegin()->first + 1);
+  if (count > int64_t(poses.size() + files.depth.size()) + kMostGaps)
     throw FormatError(
         describe_mismatch(path.string(), "frame numbers", "numbers near those of traj.txt", std::to_string(count - 1)));
-  for (int64_t number = 0; number < count; ++number) {
-    FrameRecord frame;
-    frame.index = number;
-    frame.stamp_s = double(number);
-    frame.depth.path = at_number(depth, number);
-    frame.color.path = at_number(color, number);
-    frame.labels.path = at_number(semantic, number);
-    frame.instances.path = at_number(instance, number);
-    if (number < int64_t(poses.size())) frame.pose = poses[size_t(number)].matrix;
-    listing.frames.push_back(std::move(frame));
-  }
+  std::vector<int64_t> numbers(static_cast<size_t>(count));
+  std::iota(numbers.begin(), numbers.end(), int64_t(0));
+  listing.frames = frame_records(files, numbers);
+  for (size_t i = 0; i < poses.size(); ++i) listing.frames[i].pose = poses[i].matrix;
   const fs::path camera = first_existing(path, {"cam_params.json"}).empty()
                               ? first_existing(path.parent_path(), {"cam_params.json"})
                               : path / "cam_params.json";

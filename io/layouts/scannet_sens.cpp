@@ -65,9 +65,24 @@ Intrinsics intrinsics_of(const Eigen::Matrix4d& matrix, const std::string& where
   return intrinsics_of_numbers({matrix(0, 0), matrix(1, 1), matrix(0, 2), matrix(1, 2)}, where);
 }
 
-bool recognises(const fs::path& path) { return path.extension() == ".sens" && fs::is_regular_file(path); }
+/// The file itself, or those directly in a folder.
+std::vector<fs::path> containers_at(const fs::path& path) {
+  if (!fs::is_directory(path)) return path.extension() == ".sens" ? std::vector{path} : std::vector<fs::path>{};
+  std::vector<fs::path> found;
+  std::error_code fault;
+  for (fs::directory_iterator at(path, fault), end; !fault && at != end; at.increment(fault))
+    if (at->path().extension() == ".sens") found.push_back(at->path());
+  return found;
+}
 
-SequenceListing list(const fs::path& path, const SequenceOptions& options) {
+bool recognises(const fs::path& path) { return !containers_at(path).empty(); }
+
+SequenceListing list(const fs::path& file_or_folder, const SequenceOptions& options) {
+  const std::vector<fs::path> containers = containers_at(file_or_folder);
+  if (containers.size() != 1)
+    throw FormatError(describe_mismatch(file_or_folder.string(), "sequence", "one file *.sens; name the one to read",
+                                        std::to_string(containers.size()) + " of them"));
+  const fs::path& path = containers.front();
   SequenceListing listing;
   Container file(path);
   const auto version = file.value<uint32_t>("version");
@@ -126,6 +141,6 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
 
 }  // namespace
 
-const Layout kSensLayout = {"sens", "a file *.sens", recognises, list};
+const Layout kSensLayout = {"sens", "a file *.sens, or a folder with one", recognises, list};
 
 }  // namespace felt

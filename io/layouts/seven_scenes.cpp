@@ -1,25 +1,24 @@
-#include <set>
-
 #include "core/error.h"
 #include "io/camera_file.h"
 #include "io/layouts.h"
 #include "io/layouts/file_names.h"
+#include "io/layouts/frame_files.h"
 
 namespace felt {
 namespace fs = std::filesystem;
 namespace {
 
-const std::vector<std::string> kColor = {".color.png", ".color.jpg", ".color.jpeg"}, kDepth = {".depth.png"},
-                               kPose = {".pose.txt"}, kLabels = {".segm.png", ".label.png"};
-constexpr const char* kPrefix = "frame-";
+const std::vector<std::string> kColor = {".color.png", ".color.jpg", ".color.jpeg"}, kPose = {".pose.txt"},
+                               kLabels = {".segm.png", ".label.png"};
+constexpr const char *kPrefix = "frame-", *kDepth = ".depth";
 
 /// The folder that holds the frames: `path` or its only `seq-*`.
 fs::path frame_folder(const fs::path& path) {
-  if (has_numbered_file(path, kPrefix, kDepth)) return path;
+  if (has_depth_files(path, kPrefix, kDepth)) return path;
   std::vector<fs::path> sequences;
   std::error_code fault;
   for (fs::directory_iterator at(path, fault), end; !fault && at != end; at.increment(fault))
-    if (at->path().filename().string().starts_with("seq-") && has_numbered_file(at->path(), kPrefix, kDepth))
+    if (at->path().filename().string().starts_with("seq-") && has_depth_files(at->path(), kPrefix, kDepth))
       sequences.push_back(at->path());
   if (sequences.size() > 1)
     throw FormatError(describe_mismatch(path.string(), "sequence", "one folder seq-*; name the one to read",
@@ -35,21 +34,10 @@ bool recognises(const fs::path& path) {
 SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   SequenceListing listing;
   const fs::path folder = frame_folder(path);
-  const auto depth = numbered_files(folder, kPrefix, kDepth), color = numbered_files(folder, kPrefix, kColor),
-             pose = numbered_files(folder, kPrefix, kPose), labels = numbered_files(folder, kPrefix, kLabels);
-  std::set<int64_t> numbers;
-  for (const auto* files : {&depth, &color, &pose})
-    for (const auto& [number, file] : *files) numbers.insert(number);
-  for (const int64_t number : numbers) {
-    FrameRecord frame;
-    frame.index = number;
-    frame.stamp_s = double(number);
-    frame.depth.path = at_number(depth, number);
-    frame.color.path = at_number(color, number);
-    frame.labels.path = at_number(labels, number);
-    frame.pose_file = at_number(pose, number);
-    listing.frames.push_back(std::move(frame));
-  }
+  listing.frames = frame_records({.depth = depth_files(folder, kPrefix, kDepth),
+                                  .color = numbered_files(folder, kPrefix, kColor),
+                                  .labels = numbered_files(folder, kPrefix, kLabels),
+                                  .pose = numbered_files(folder, kPrefix, kPose)});
   const fs::path above = folder.parent_path();
   fs::path camera;
   for (const fs::path& place : {folder, above}) {

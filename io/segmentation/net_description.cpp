@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "io/text_input.h"
+#include "io/yaml_problems.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -17,14 +18,10 @@ constexpr size_t kLimitBytes = 1 << 20;
 constexpr int kMostPixelsAcross = 8192;
 
 /// Reads the keys of one YAML table and gathers what is wrong with them.
-class Reader {
+class Reader : public YamlProblems {
 public:
-  Reader(const fs::path& path, std::vector<std::string>& problems) : path_(path), problems_(problems) {}
+  using YamlProblems::YamlProblems;
 
-  void problem(const YAML::Node& at, const std::string& what, const std::string& expected, const std::string& found) {
-    problems_.push_back(
-        describe_mismatch(path_.string() + ":" + std::to_string(at.Mark().line + 1), what, expected, found));
-  }
   /// The table under `key`, or an undefined node; refuses keys in it that are not `known`.
   YAML::Node table(const YAML::Node& parent, const char* key, const std::set<std::string>& known) {
     const YAML::Node node = parent[key];
@@ -35,14 +32,6 @@ public:
     }
     refuse_unknown(node, known);
     return node;
-  }
-  void refuse_unknown(const YAML::Node& node, const std::set<std::string>& known) {
-    std::string names;
-    for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
-    for (const auto& entry : node)
-      if (!entry.first.IsScalar() || !known.contains(entry.first.Scalar()))
-        problem(entry.first, "key", "one of " + names,
-                entry.first.IsScalar() ? "'" + entry.first.Scalar() + "'" : "a list");
   }
   std::string text(const YAML::Node& parent, const char* key, const std::string& otherwise) {
     const YAML::Node node = parent ? parent[key] : YAML::Node(YAML::NodeType::Undefined);
@@ -79,10 +68,6 @@ public:
     }
     return values;
   }
-
-private:
-  const fs::path& path_;
-  std::vector<std::string>& problems_;
 };
 
 void read_size(const YAML::Node& input, NetDescription& net, Reader& reader) {
@@ -156,8 +141,7 @@ NetDescription read_net_description(const fs::path& path) {
   NetDescription net;
   net.described_in = path;
   const std::string content = read_whole_file(path, kLimitBytes);
-  std::vector<std::string> problems;
-  Reader reader(path, problems);
+  Reader reader(path);
   try {
     const YAML::Node root = YAML::Load(content);
     if (!root.IsMap())
@@ -183,9 +167,9 @@ NetDescription read_net_description(const fs::path& path) {
     read_mapping(root, net, reader);
     if (root["otherwise"]) net.otherwise = reader.text(root, "otherwise", kNoClassName);
   } catch (const YAML::Exception& fault) {
-    problems.push_back(path.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
+    reader.problems.push_back(path.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
   }
-  if (!problems.empty()) throw ConfigError(problems);
+  if (!reader.problems.empty()) throw ConfigError(reader.problems);
   return net;
 }
 

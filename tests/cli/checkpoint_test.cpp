@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <filesystem>
@@ -117,6 +118,49 @@ TEST_CASE("a run that was interrupted goes on with --resume to the same map") {
   CHECK(report.at("frames").at("resumed_after") == read);
   CHECK(report.at("frames").at("fused") == 1200);
   CHECK(report.at("map_hash") == json::parse(file_text(whole / "report.json")).at("map_hash"));
+}
+
+TEST_CASE("touches of a run that is stopped before, between and after them make the map of an uninterrupted run") {
+  // The room's touches belong to frames 4, 9, 14 and 19 of 24.
+  const TemporaryDirectory folder;
+  const fs::path room = source_dir() / "data/scenes/room", whole = folder.path() / "whole", out = folder.path() / "out";
+  const std::string options = "--no-color --checkpoint 1";
+  REQUIRE(run_feltmap(reconstruct(room, whole, options)).exit_code == 0);
+  const json expected = json::parse(file_text(whole / "report.json"));
+  REQUIRE(expected.at("touches").at("applied") == 4);
+  const auto same_as_whole = [&] {
+    const json report = json::parse(file_text(out / "report.json"));
+    CHECK(report.at("map_hash") == expected.at("map_hash"));
+    CHECK(report.at("touches") == expected.at("touches"));
+    CHECK(file_text(out / "map.vdb") == file_text(whole / "map.vdb"));
+    CHECK(file_text(out / "mesh.ply") == file_text(whole / "mesh.ply"));
+  };
+  // Killed again and again, each time as soon as there is another checkpoint.
+  std::vector<int64_t> stops;
+  for (int64_t read = 0; read < 24;) {
+    const fs::path map = out / "map.vdb", mark = folder.path() / "mark";
+    fs::remove(mark);
+    if (fs::exists(map)) fs::copy_file(map, mark);
+    const CommandResult run = run_feltmap_within(
+        "", reconstruct(room, out, options + " --resume --threads 1"),
+        " & pid=$!; until [ -e " + quoted(map) + " ] && ! cmp -s " + quoted(map) + " " + quoted(mark) +
+            "; do kill -0 $pid 2>/dev/null || break; sleep 0.01; done; kill -9 $pid 2>/dev/null; wait $pid");
+    const int64_t now = frames_in(map);
+    INFO(run.err);
+    REQUIRE(now > read);
+    read = now;
+    stops.push_back(now);
+    if (run.exit_code == 0) break;
+    REQUIRE(run.exit_code == 128 + 9);
+  }
+  const auto between = std::count_if(stops.begin(), stops.end(), [](int64_t n) { return n > 4 && n <= 19; });
+  INFO(stops.size() << " stops");
+  CHECK(between >= 1);
+  REQUIRE(run_feltmap(reconstruct(room, out, options + " --resume")).exit_code == 0);
+  same_as_whole();
+  // Once more after the end: nothing is applied twice, and the report still says what became of them.
+  REQUIRE(run_feltmap(reconstruct(room, out, options + " --resume")).exit_code == 0);
+  same_as_whole();
 }
 
 TEST_CASE("resuming with another recording or other settings is refused, each named, and the map stays") {

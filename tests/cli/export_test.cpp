@@ -113,6 +113,19 @@ TEST_CASE("a GLB file is what a reader that is not ours expects, for every kind 
     CHECK(found.at("NORMAL")[2] == vertices);
     CHECK(std::stoul(found.at("indices")[2]) == 3 * written["mesh"]["triangles"].get<size_t>());
     CHECK(std::stoul(found["indices"][4]) + 1 == written["mesh"]["vertices"].get<size_t>());
+    // What is believed comes along whatever the colours show.
+    for (const char* attribute : {"_LABEL", "_FRICTION_MEAN", "_FRICTION_SD", "_TOUCHED"}) {
+      INFO(attribute);
+      REQUIRE(found.count(attribute) == 1);
+      CHECK(found[attribute][0] == "1");
+      CHECK(found[attribute][1] == "5126");
+      CHECK(found[attribute][2] == vertices);
+    }
+    CHECK(found["_TOUCHED"][3] == "0");
+    CHECK(found["_TOUCHED"][4] == "1");
+    CHECK(std::stod(found["_FRICTION_MEAN"][3]) < 0.2);
+    CHECK(std::stod(found["_FRICTION_MEAN"][4]) > 0.28);
+    CHECK(found.count("_ENTROPY") == (std::string(color) == "entropy"));
     if (std::string(color) == "rgb") continue;  // the floor was never photographed
     CHECK(found.at("COLOR_0")[0] == "4");
     CHECK(found["COLOR_0"][2] == vertices);
@@ -144,6 +157,89 @@ TEST_CASE("colours of a surface say what is believed, and the scale is stated") 
       run_feltmap("export --force " + quoted(floor.map) + " --mesh " + quoted(file) + " --color-by stiffness.mean");
   CHECK(unknown.exit_code == 3);
   CHECK_THAT(unknown.err, Contains("friction.mean") && Contains("stiffness.mean"));
+}
+
+TEST_CASE("vertices carry the probability of their class and its entropy, whatever the colour shows") {
+  const TouchedFloor floor;
+  const fs::path file = floor.directory.path() / "floor.ply", points = floor.directory.path() / "points.csv";
+  for (const char* color : {"rgb", "class", "entropy", "friction.mean"}) {
+    INFO(color);
+    floor.exported("--mesh " + quoted(file) + " --color-by " + color);
+    const TriangleMesh mesh = read_mesh(file);
+    const std::vector<float>*probability = TriangleMesh::find(mesh.scalars, "label_prob"),
+          *entropy = TriangleMesh::find(mesh.scalars, "entropy");
+    REQUIRE(probability != nullptr);
+    REQUIRE(entropy != nullptr);
+    CHECK(std::ranges::count(mesh.scalars, "entropy", &MeshScalars::name) == 1);
+    std::ofstream asked(points);
+    std::vector<size_t> vertices;
+    for (size_t i = 0; i < mesh.positions.size(); i += mesh.positions.size() / 20) {
+      asked << mesh.positions[i].x() << "," << mesh.positions[i].y() << "," << mesh.positions[i].z() << "\n";
+      vertices.push_back(i);
+    }
+    asked.close();
+    const CommandResult answers = run_feltmap("query --json " + quoted(floor.map) + " --file " + quoted(points));
+    REQUIRE(answers.exit_code == 0);
+    const json believed = json::parse(answers.out).at("points");
+    for (size_t n = 0; n < vertices.size(); ++n) {
+      const json& b = believed.at(n);
+      const size_t i = vertices[n];
+      CHECK(mesh.labels[i] == (b.at("class") == "wood" ? 1 : 2));
+      CHECK((*probability)[i] == Approx(b.at("class_probability").at(b.at("class").get<std::string>()).get<double>()));
+      CHECK((*entropy)[i] == Approx(b.at("class_entropy").get<double>()).margin(1e-6));
+    }
+  }
+}
+
+TEST_CASE("every exported mesh says what is believed of each property and where it was touched") {
+  const TouchedFloor floor;
+  const auto examine = [](const fs::path& file) {
+    INFO(file);
+    const TriangleMesh mesh = read_mesh(file);
+    REQUIRE_FALSE(mesh.positions.empty());
+    const auto *mean = TriangleMesh::find(mesh.scalars, "friction_mean"),
+               *sd = TriangleMesh::find(mesh.scalars, "friction_sd"),
+               *touched = TriangleMesh::find(mesh.scalars, "touched");
+    REQUIRE((mean != nullptr && sd != nullptr && touched != nullptr));
+    CHECK(mesh.scalars.size() == 5);
+    REQUIRE(mesh.labels.size() == mesh.positions.size());
+    for (size_t i = 0; i < mesh.positions.size(); ++i) {
+      const float x = mesh.positions[i].x();
+      if (std::abs(x) < 0.05f) continue;
+      CHECK(mesh.labels[i] == (x < 0 ? 1 : 2));
+      CHECK((*touched)[i] == (x < 0 ? 0.0f : 1.0f));
+      CHECK(((*mean)[i] > 0.28f) == (x < 0));
+      CHECK((*sd)[i] > 0);
+    }
+  };
+  const fs::path whole = floor.directory.path() / "whole.ply", points = floor.directory.path() / "points.ply",
+                 region = floor.directory.path() / "region.ply";
+  floor.exported("--mesh " + quoted(whole) + " --points " + quoted(points));
+  examine(whole);
+  examine(points);
+  REQUIRE(run_feltmap("region " + quoted(floor.map) + " --at 0.2,0,0 --mesh " + quoted(region)).exit_code == 0);
+  examine(region);
+}
+
+TEST_CASE("a GLB file holds 0 where nothing is known of a property, and says so") {
+  const TemporaryDirectory folder;
+  Map floor = labelled_map(
+      0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); }, class_table({"wood"}),
+      [](const Eigen::Vector3d& p) { return p.x() < 0 ? 0 : -1; });
+  Property warmth;
+  warmth.name = "surface-warmth";
+  warmth.priors = {{"wood", {-3, 0.5, 50}}};
+  floor.properties = PropertyTable({warmth});
+  const fs::path map = folder.path() / "map.vdb", file = folder.path() / "floor.glb";
+  save_map(floor, map);
+  REQUIRE(run_feltmap("export " + quoted(map) + " --mesh " + quoted(file)).exit_code == 0);
+  auto found = lines_of("stock_glb_reader", file);
+  REQUIRE(found.at("_SURFACE_WARMTH_MEAN").size() == 5);
+  CHECK(std::stod(found["_SURFACE_WARMTH_MEAN"][3]) == Approx(-3));
+  CHECK(found["_SURFACE_WARMTH_MEAN"][4] == "0");
+  CHECK(found.at("_SURFACE_WARMTH_MEAN_KNOWN")[3] == "0");
+  CHECK(found.at("_SURFACE_WARMTH_MEAN_KNOWN")[4] == "1");
+  CHECK(found.count("_TOUCHED_KNOWN") == 0);
 }
 
 TEST_CASE("a class, a box and a segment cut the surface and the grids where they end") {
@@ -202,6 +298,49 @@ TEST_CASE("a compact VDB holds the chosen grids in 16 bits, for a reader that is
       run_feltmap("export --force " + quoted(floor.map) + " --vdb " + quoted(compact) + " --grids colour");
   CHECK(unknown.exit_code == 3);
   CHECK_THAT(unknown.err, Contains("'colour'") && Contains("evidence/ice"));
+}
+
+TEST_CASE("info counts in every grid what a reader that is not ours finds in the file") {
+  const TouchedFloor floor;
+  const CommandResult result = run_feltmap("info --grids --json " + quoted(floor.map));
+  REQUIRE(result.exit_code == 0);
+  const json grids = json::parse(result.out).at("grids");
+  auto stock = lines_of("stock_vdb_reader", floor.map);
+  CHECK(grids.size() == stock.size());
+  CHECK(grids.contains("touched"));
+  CHECK(grids.contains("property/friction/ice/kappa"));
+  for (const auto& [name, found] : grids.items()) {
+    INFO(name);
+    REQUIRE(stock.contains(name));
+    CHECK(std::to_string(found.at("active_voxels").get<uint64_t>()) == stock[name][2]);
+    if (!found.contains("least")) continue;
+    CHECK(found.at("least").get<double>() == Approx(std::stod(stock[name][4])).epsilon(1e-5));
+    CHECK(found.at("greatest").get<double>() == Approx(std::stod(stock[name][5])).epsilon(1e-5));
+    CHECK(found.at("mean") >= found.at("least"));
+    CHECK(found.at("mean") <= found.at("greatest"));
+  }
+}
+
+TEST_CASE("a compact map file is the same map in fewer bytes") {
+  const TouchedFloor floor;
+  const fs::path compact = floor.directory.path() / "compact.vdb";
+  floor.exported("--vdb " + quoted(compact) + " --compact");
+  CHECK(map_hash(load_map(compact)) == map_hash(load_map(floor.map)));
+  CHECK(fs::file_size(compact) < fs::file_size(floor.map) / 2);
+  CHECK(run_feltmap("diff " + quoted(compact) + " " + quoted(floor.map)).exit_code == 0);
+}
+
+TEST_CASE("a photographed surface keeps its colours in a GLB file") {
+  const TemporaryDirectory directory;
+  const fs::path out = directory.path() / "out", file = directory.path() / "boxes.glb";
+  REQUIRE(run_feltmap("reconstruct " + quoted(boxes()) + " --out " + quoted(out) + " --quiet --voxel-size 0.05")
+              .exit_code == 0);
+  const CommandResult result =
+      run_feltmap("export --json " + quoted(out / "map.vdb") + " --color-by rgb --mesh " + quoted(file));
+  REQUIRE(result.exit_code == 0);
+  auto found = lines_of("stock_glb_reader", file);
+  REQUIRE(found.contains("COLOR_0"));
+  CHECK(found["COLOR_0"][2] == json::parse(result.out)["mesh"]["vertices"].dump());
 }
 
 }  // namespace felt::test

@@ -146,6 +146,46 @@ TEST_CASE("ignored classes build no surface, and unknown ids are named and count
   CHECK(two.at("labels").at("unknown_id_pixels").size() == 1);
 }
 
+TEST_CASE("query says which thing a point belongs to, of maps that know") {
+  const Recording recording;
+  const auto ask = [&](const std::string& points) {
+    const CommandResult asked = run_feltmap("query " + quoted(recording.out / "map.vdb") + " --json" + points);
+    INFO(asked.err);
+    REQUIRE(asked.exit_code == 0);
+    return json::parse(asked.out).at("points");
+  };
+  REQUIRE(recording.reconstruct("").exit_code == 0);
+  CHECK_FALSE(ask(" --at=0,0,1.1").at(0).contains("instance"));
+
+  fs::create_directories(recording.sequence / "instances");
+  Image<uint16_t> things = label_image();  // thing 42 where the sofa is, none elsewhere
+  for (uint16_t& id : things) id = id == 3 ? 42 : 0;
+  for (int i = 0; i < 4; ++i)
+    write_bytes(recording.sequence / "instances" / (std::to_string(i) + ".png"), encode_png(things));
+  REQUIRE(recording.reconstruct("--instances").exit_code == 0);
+  const Map map = recording.map();
+  std::string thing, nothing;
+  int votes = 0;
+  for (const Block& block : map.store.blocks())
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      if (!(block.geometry->weight[i] > 0)) continue;
+      const Index3 first = first_voxel(block.coord), in = voxel_of_offset(i);
+      const std::string at = " --at=" + std::to_string(0.05 * (first.x + in.x)) + "," +
+                             std::to_string(0.05 * (first.y + in.y)) + "," + std::to_string(0.05 * (first.z + in.z));
+      if (block.instance == nullptr || block.instance->votes[i] == 0)
+        nothing = at;
+      else if (block.instance->id[i] == 42)
+        thing = at, votes = block.instance->votes[i];
+    }
+  REQUIRE_FALSE(thing.empty());
+  REQUIRE_FALSE(nothing.empty());
+  const json found = ask(thing + nothing);
+  CHECK(found.at(0).at("instance") == json{{"id", 42}, {"votes", votes}});
+  CHECK(found.at(1).at("instance").is_null());
+  const CommandResult text = run_feltmap("query " + quoted(recording.out / "map.vdb") + thing + nothing);
+  CHECK_THAT(text.out, Contains("instance 42") && Contains("no instance"));
+}
+
 TEST_CASE("grids of classes open in a program that knows only OpenVDB") {
   const Recording recording;
   REQUIRE(recording.reconstruct("").exit_code == 0);

@@ -12,6 +12,7 @@
 #include "io/camera_file.h"
 #include "io/class_table_file.h"
 #include "io/confusion_file.h"
+#include "io/depth_decode.h"
 #include "io/fit_priors.h"
 #include "io/friction_log.h"
 #include "io/image_decode.h"
@@ -100,6 +101,8 @@ void read_priors(const std::string& bytes) { fit_priors_json(read_readings_csv(a
 void read_scene_yaml(const std::string& bytes) { parse_scene(bytes, "scene.yaml"); }
 void read_touches_csv(const std::string& bytes) { parse_touches(bytes, "touches.csv"); }
 
+void read_depth(const std::string& bytes) { decode_depth(as_image(bytes), "depth"); }
+
 void read_friction(const std::string& bytes) { friction_reading(parse_force_log(bytes, "log.csv"), {}); }
 
 void read_image(const std::string& bytes) {
@@ -115,10 +118,9 @@ void read_infer(const std::string& bytes) {
 
 /// The content of a map file behind a checksum that is right, which damage alone never gives.
 void read_map(const std::string& bytes) {
-  const fs::path path = as_file("map.vdb", bytes);
-  const std::string trailer = make_map_trailer(path, kMapFileVersion);
-  std::ofstream(path, std::ios::binary | std::ios::app) << trailer;
-  verify(load_map(path));
+  MapTrailer trailer;
+  trailer.add(bytes.data(), bytes.size());
+  verify(load_map(as_file("map.vdb", bytes + trailer.finish(kMapFileVersion))));
 }
 
 void read_poses_text(const std::string& bytes) {
@@ -162,6 +164,16 @@ void read_redwood_log(const std::string& bytes) {
 
 void read_scan(const std::string& bytes) { read_frames_of(as_file("scan.bin", bytes), "lidar"); }
 
+/// One view of 8 x 6 pixels; the bytes are the poses beside it.
+void read_scenenet(const std::string& bytes) {
+  const fs::path folder = scratch_folder() / "scenenet" / "0" / "7";
+  write_view(folder / "depth" / "0.png");
+  write_view(folder / "photo" / "0.png");
+  as_file("scenenet/0/7/intrinsics.txt", "5 5 3.5 2.5\n");
+  as_file("scenenet/poses.pb", bytes);
+  read_frames_of(folder, "scenenet");
+}
+
 void read_tum_lists(const std::string& bytes) {
   write_view(scratch_folder() / "tum" / "depth" / "1.png");
   as_file("tum/camera-intrinsics.txt", "5 5 3.5 2.5\n");
@@ -202,6 +214,7 @@ constexpr Harness kHarnesses[] = {
     {"classes_yaml", read_classes_yaml, kFree, kText},
     {"config", read_config, kFree, kText},
     {"confusion", read_confusion, kFree, kText},
+    {"depth", read_depth, kFree, kImage},
     {"frames", read_frames, kFree, kText},
     {"friction", read_friction, kFree, kText},
     {"image", read_image, kFree, kImage},
@@ -216,6 +229,7 @@ constexpr Harness kHarnesses[] = {
     {"redwood_log", read_redwood_log, kFree, kText},
     {"scan", read_scan, kFree, kText},
     {"scene", read_scene_yaml, kFree, kText},
+    {"scenenet", read_scenenet, kFree, kText},
     {"sens", read_sens, kFree, kImage},
     {"sequence", read_sequence_yaml, kFree, kText},
     {"touch_journal", read_touch_journal, kFree, kText},

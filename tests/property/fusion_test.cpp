@@ -53,7 +53,7 @@ TEST_CASE("every SIMD target fuses the scalar version's bits") {
     corrupt(frame.depth_m, random);
     for (Rgba8& pixel : frame.color) pixel.a = random() < 0.1 ? 0 : 255;
     std::vector<float> scale;
-    if (variant % 3 != 0)
+    if (config.distance == DistanceModel::tangent_plane)
       for (size_t i = 0; i < frame.depth_m.size(); ++i) scale.push_back(random() < 0.1 ? 0.0f : float(random()));
     const Map map(0.02, 0.08);
     const DepthView view = depth_view(frame, config, map, scale.empty() ? nullptr : scale.data());
@@ -266,7 +266,7 @@ TEST_CASE("fusion equals a naive loop over every voxel of the box around the sce
           const Eigen::Vector2d pixel = frame.camera.project(p);
           const double u = std::floor(pixel.x() + 0.5), v = std::floor(pixel.y() + 0.5);
           if (u < 0 || v < 0 || u >= frame.camera.width || v >= frame.camera.height) continue;
-          const double d = frame.depth_m(int(u), int(v)), sdf = d - p.z();
+          const double d = frame.depth_m(int(u), int(v)), sdf = (d - p.z()) * p.norm() / p.z();  // along the ray
           if (d < config.min_depth_m || d > config.max_depth_m || std::abs(sdf) >= map.truncation_m) continue;
           const double w =
               sdf < -map.voxel_size_m ? (sdf + map.truncation_m) / (map.truncation_m - map.voxel_size_m) : 1;

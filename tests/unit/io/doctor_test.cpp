@@ -61,6 +61,20 @@ TEST_CASE("the doctor accuses no sound sequence and proposes settings that suit 
   CHECK(accused_topics(examine_quickly(room())) == "");
 }
 
+TEST_CASE("the doctor accuses none of the stored scenes, however few and flat their views are") {
+  for (const char* name : {"table_wall"}) {
+    INFO(name);
+    const fs::path scene = source_dir() / "data" / "scenes" / name;
+    CHECK(accused_topics(examine_sequence(scene)) == "");
+    CHECK(accused_topics(examine_quickly(scene)) == "");
+  }
+}
+
+TEST_CASE("the four views of a scan are no copies of one another") {
+  FELTMAP_REQUIRE_DATA(folder, "lidar_kitti");
+  CHECK(accused_topics(examine_sequence(folder / "tp3d_000000.bin")) == "");
+}
+
 TEST_CASE("the doctor names a single fault of a sequence and the option that mends it") {
   struct Case {
     const char* fault;

@@ -113,6 +113,34 @@ TEST_CASE("texts with a byte order mark and Windows line ends read like any othe
   }
 }
 
+TEST_CASE("paths with blanks, quotes and letters of any script are paths like others, in every layout") {
+  TemporaryDirectory folder;
+  const fs::path odd = folder.path() / "die K\u00fcche (2. Versuch) 'a' \"b\" \u623f\u9593 \U0001f3e0 %d #1";
+  struct Layout {
+    const char* name;
+    void (*write)(const fs::path&, int);
+  };
+  for (const Layout& layout :
+       {Layout{"7scenes", write_seven_scenes}, Layout{"tum", write_tum}, Layout{"replica", write_replica},
+        Layout{"redwood", write_redwood}, Layout{"icl", write_icl}, Layout{"scannet", write_scannet},
+        Layout{"generic", write_generic}}) {
+    INFO(layout.name);
+    layout.write(odd / layout.name, 2);
+    const auto reader = open_sequence(odd / layout.name);
+    CHECK(reader->info().layout == layout.name);
+    CHECK(std::holds_alternative<Frame>(reader->read(1)));
+  }
+  // Names with blanks within a list, and folders that the description names.
+  fs::rename(odd / "tum" / "depth", odd / "tum" / "depth of the \u00fc kitchen");
+  write_text(odd / "tum" / "depth.txt", "100.000000 depth of the \u00fc kitchen/100.000000.png\n");
+  CHECK(std::holds_alternative<Frame>(open_sequence(odd / "tum")->read(0)));
+  fs::rename(odd / "generic" / "depth", odd / "generic" / "Tiefe \u00e4");
+  write_text(odd / "generic" / "sequence.yaml",
+             "camera: {fx: 20, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16}\ndepth_scale: 2000\n"
+             "paths: {depth: \"Tiefe \u00e4\"}\n");
+  CHECK(std::holds_alternative<Frame>(open_sequence(odd / "generic")->read(0)));
+}
+
 TEST_CASE("decimal commas are refused with the reason named") {
   TemporaryDirectory folder;
   write_generic(folder.path(), 1);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include "io/infer_plot.h"
@@ -36,6 +37,34 @@ TEST_CASE("the ends of a curve lie on the ends of the axes") {
   Plot plot{"", "", "", {{"", {10, 20}, {0, 8}}}, {}};
   const std::string svg = plot_svg({plot}, 1, 400, 300);
   CHECK(count_of(svg, "M62.0,256.0L388.0,30.0") == 1);
+}
+
+TEST_CASE("labels of markers keep off the legend, each other and the right end") {
+  Plot plot{"", "", "", {}, {{0, "contact"}, {0.1, "slip"}, {9, "release"}, {10, "end"}}};
+  plot.series.push_back({"normal", {0, 10}, {0, 1}});
+  plot.series.push_back({"tangential", {0, 10}, {1, 1}});
+  const std::string svg = plot_svg({plot}, 1, 400, 300);
+  struct Placed {
+    double x, y;
+    std::string anchor;
+  };
+  const auto placed = [&](const std::string& text) {
+    const size_t end = svg.find('>' + text + "</text>"), begin = svg.rfind("<text", end);
+    REQUIRE(end != std::string::npos);
+    Placed p;
+    char anchor[8] = {};
+    REQUIRE(std::sscanf(svg.c_str() + begin, "<text x=\"%lf\" y=\"%lf\" text-anchor=\"%7[a-z]", &p.x, &p.y, anchor) == 3);
+    p.anchor = anchor;
+    return p;
+  };
+  const double line = 11;  // height of the letters
+  CHECK(placed("contact").y < placed("tangential").y);
+  CHECK(placed("slip").y >= placed("contact").y + line);
+  CHECK(placed("release").y >= placed("tangential").y + line);
+  CHECK(placed("end").y >= placed("tangential").y + line);
+  CHECK(placed("end").anchor == "end");
+  CHECK(placed("end").x < 388);
+  CHECK(std::abs(placed("end").y - placed("release").y) >= line);
 }
 
 TEST_CASE("a logarithmic axis places decades evenly and leaves out what is not positive") {

@@ -135,6 +135,13 @@ TEST_CASE("a .sens container gives the frames it was made of, and its lost frame
     CHECK(std::abs(first.depth_m.data()[p] - original.depth_m.data()[p]) < 0.0007f);  // millimetres are stored
 }
 
+TEST_CASE("a folder with one container is that container, and recordings of ROS are told as what they are") {
+  FELTMAP_REQUIRE_DATA(folder, "scannet_sens_small");
+  CHECK(open_sequence(folder)->size() == open_sequence(folder / "house_living.sens")->size());
+  FELTMAP_REQUIRE_DATA(logs, "small_logs");
+  CHECK_THROWS_WITH(open_sequence(logs), Catch::Contains("*.bag") && Catch::Contains("ROS"));
+}
+
 TEST_CASE("probability maps of single classes become probabilities that sum to one") {
   FELTMAP_REQUIRE_DATA(folder, "apc_shelf_probs");
   const auto reader = open_sequence(folder);

@@ -60,6 +60,54 @@ TEST_CASE("depth, colour and labels of a distorting lens are undistorted alike")
   CHECK(only_frame(folder.path()).depth_m == straight.depth_m);
 }
 
+TEST_CASE("probabilities of a distorting lens are undistorted as labels are, in each way to store them") {
+  TemporaryDirectory folder;
+  write_generic(folder.path(), 1);
+  const Image<int32_t> map = undistortion_map(kCamera, kLens);
+  const auto check = [&](const SequenceOptions& plain_options) {
+    SequenceOptions lens_options = plain_options;
+    lens_options.distortion = kLens;
+    const ProbabilityImage plain = only_frame(folder.path(), plain_options).probabilities,
+                           straight = only_frame(folder.path(), lens_options).probabilities;
+    REQUIRE(straight.top == plain.top);
+    REQUIRE(straight.probability.size() == plain.probability.size());
+    size_t moved = 0;
+    for (size_t p = 0; p < map.size(); ++p)
+      for (size_t m = 0; m < size_t(plain.top); ++m) {
+        const int32_t from = map.data()[p];
+        const size_t to = p * size_t(plain.top) + m, source = size_t(from < 0 ? 0 : from) * size_t(plain.top) + m;
+        if (from < 0) {
+          // The rest belongs to class 0 where maps of single classes leave any.
+          CHECK((straight.probability[to] == 0 || straight.class_id[to] == 0));
+          continue;
+        }
+        CHECK(straight.probability[to] == plain.probability[source]);
+        CHECK(straight.class_id[to] == plain.class_id[source]);
+        moved += straight.probability[to] != plain.probability[to];
+      }
+    CHECK(moved > 20);
+  };
+  Image<uint16_t> values(kWidth, kHeight), stack(kWidth, 4 * kHeight);
+  for (size_t p = 0; p < values.size(); ++p) values.data()[p] = uint16_t(100 * p + 7);
+  for (size_t p = 0; p < values.size(); ++p) {
+    stack.data()[p] = uint16_t(1 + p % 3);
+    stack.data()[values.size() + p] = uint16_t(1 + (p + 1) % 3);
+    stack.data()[2 * values.size() + p] = uint16_t(30000 + 50 * p);
+    stack.data()[3 * values.size() + p] = uint16_t(10000 - 20 * p);
+  }
+  std::filesystem::create_directories(folder.path() / "probs");
+  write_bytes(folder.path() / "probs" / "0.png", encode_png(stack));
+  check({});
+  write_bytes(folder.path() / "probs" / "0.png", encode_png(values));  // of the label
+  check({});
+  std::filesystem::remove_all(folder.path() / "probs");
+  for (const char* name : {"frame-000000.wall.png", "frame-000000.sofa.mask.png"}) {
+    std::filesystem::create_directories(folder.path() / "maps");
+    write_bytes(folder.path() / "maps" / name, encode_png(values));
+  }
+  check({.probs_dir = folder.path() / "maps"});
+}
+
 TEST_CASE("colour of a camera beside the depth camera is taken where depth projects into it") {
   TemporaryDirectory folder;
   write_generic(folder.path(), 1);

@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "mapping/map.h"
-#include "mapping/vdb_views.h"
+#include "mapping/vdb_state.h"
 
 using namespace felt;
 
@@ -46,7 +46,9 @@ TEST_CASE("the stock grids hold the map's values at the voxel's index") {
   Block& b = map.store[map.store.find_or_create({-1, 0, 2})];
   b.geometry->tsdf[voxel_offset(7, 3, 1)] = -0.03f;
   b.geometry->weight[voxel_offset(7, 3, 1)] = 4;
-  const auto tsdf = tsdf_grid(map), weight = weight_grid(map);
+  const BlockLists lists = block_lists(map);
+  const auto tsdf = openvdb::gridPtrCast<openvdb::FloatGrid>(stock_grid(tsdf_grid(map, lists.observed)));
+  const auto weight = openvdb::gridPtrCast<openvdb::FloatGrid>(stock_grid(weight_grid(map, lists.observed)));
   CHECK(tsdf->tree().getValue({-1, 3, 17}) == -0.03f);
   CHECK(tsdf->tree().isValueOn({-1, 3, 17}));
   CHECK(tsdf->activeVoxelCount() == 1);

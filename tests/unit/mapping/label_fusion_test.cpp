@@ -36,20 +36,26 @@ struct OneBlock {
 
   explicit OneBlock(int k) : classes(table(k)) {
     std::fill_n(observation.valid, kBlockVoxels / 8, uint8_t(0xff));
+    observation.groups = ~uint32_t(0);
     view.classes = &classes;
     view.band_m = 0.02f;
     view.evidence = 1;
   }
+  LabelStats fuse() {
+    LabelFusion fusion(view, store);
+    fusion.add(observation, store[number]);
+    return fusion.finish();
+  }
   LabelStats see(uint16_t id) {
     labels(0, 0) = id;
     view.labels = &labels, view.probabilities = nullptr;
-    return fuse_labels(observation, view, store[number], store);
+    return fuse();
   }
   LabelStats see(const std::vector<std::pair<uint16_t, float>>& named) {
     probabilities = {1, 1, int(named.size()), {}, {}};
     for (const auto& [id, p] : named) probabilities.class_id.push_back(id), probabilities.probability.push_back(p);
     view.labels = nullptr, view.probabilities = &probabilities;
-    return fuse_labels(observation, view, store[number], store);
+    return fuse();
   }
   /// Evidence of each class at one voxel, the shared part included.
   std::vector<double> evidence(int offset = 100) const {
@@ -238,7 +244,7 @@ TEST_CASE("instance ids are the majority of the votes") {
   block.view.instances = &instances;
   const auto see = [&](uint16_t id) {
     instances(0, 0) = id;
-    fuse_labels(block.observation, block.view, block.store[block.number], block.store);
+    block.fuse();
   };
   see(0);
   see(kNoLabel);

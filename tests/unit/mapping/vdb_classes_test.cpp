@@ -16,14 +16,22 @@ openvdb::Coord coord_of(const Block& block, int offset) {
   return {f.x + v.x, f.y + v.y, f.z + v.z};
 }
 
+template <typename Grid>
+typename Grid::Ptr stock(const LeafGrid& grid) {
+  openvdb::initialize();
+  return openvdb::gridPtrCast<Grid>(stock_grid(grid));
+}
+
+const TouchViews untouched = std::make_shared<const std::vector<TouchView>>();
+
 }  // namespace
 
 TEST_CASE("grids of beliefs hold each voxel's class id, its probability, entropy and evidence, and nothing else") {
   const Map map = test::random_map({.seed = 5, .blocks = 12, .classes = 4});
-  const auto label = label_grid(map, {});
-  const auto probability = label_probability_grid(map, {});
-  const auto entropy = entropy_grid(map, {});
-  const auto total = total_evidence_grid(map);
+  const auto label = stock<openvdb::Int32Grid>(label_grid(map, untouched));
+  const auto probability = stock<openvdb::FloatGrid>(label_probability_grid(map, untouched));
+  const auto entropy = stock<openvdb::FloatGrid>(entropy_grid(map, untouched));
+  const auto total = stock<openvdb::FloatGrid>(total_evidence_grid(map));
   size_t labelled = 0;
   for (const Block& block : map.store.blocks())
     for (int i = 0; i < kBlockVoxels; ++i) {
@@ -49,9 +57,9 @@ TEST_CASE("where a touch reached, the grids show the belief after it") {
   view.coord = block.coord;
   view.mask.set(77);
   view.label[77] = 2, view.label_probability[77] = 0.875f, view.entropy[77] = 0.125f;
-  const std::vector<TouchView> touched = {view};
+  const auto touched = std::make_shared<const std::vector<TouchView>>(1, view);
   const openvdb::Coord at = coord_of(block, 77);
-  CHECK(label_grid(map, touched)->tree().getValue(at) == int(map.classes.at_slot(2).id));
-  CHECK(label_probability_grid(map, touched)->tree().getValue(at) == 0.875f);
-  CHECK(entropy_grid(map, touched)->tree().getValue(at) == 0.125f);
+  CHECK(stock<openvdb::Int32Grid>(label_grid(map, touched))->tree().getValue(at) == int(map.classes.at_slot(2).id));
+  CHECK(stock<openvdb::FloatGrid>(label_probability_grid(map, touched))->tree().getValue(at) == 0.875f);
+  CHECK(stock<openvdb::FloatGrid>(entropy_grid(map, touched))->tree().getValue(at) == 0.125f);
 }

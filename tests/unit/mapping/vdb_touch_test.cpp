@@ -42,7 +42,7 @@ std::map<std::string, openvdb::GridBase::Ptr> grids_of(const Map& map) {
   openvdb::initialize();
   std::map<std::string, openvdb::GridBase::Ptr> grids;
   const auto touched = std::make_shared<const std::vector<TouchView>>(touch_views(map));
-  for (const NamedGrid& grid : touch_grids(map, touched)) grids[grid.name] = grid.make();
+  for (const LeafGrid& grid : touch_grids(map, touched)) grids[grid.name] = stock_grid(grid);
   for (const auto& [name, grid] : grids) CHECK(grid->getName() == name);
   return grids;
 }
