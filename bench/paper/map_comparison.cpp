@@ -173,6 +173,13 @@ int touch(Map& map, const Recording& recording, const std::vector<Reading>& read
   return refused;
 }
 
+void undo_touches(Map& map) {
+  std::vector<uint64_t> ids;
+  for (const Touch& t : map.touches.touches)
+    if (!t.undone) ids.push_back(t.id);
+  for (const uint64_t id : ids) undo_touch(map, id);
+}
+
 int touch_as_suggested(Map& map, const Recording& recording, int count, uint64_t seed) {
   SuggestionSettings settings;
   settings.most = 50;

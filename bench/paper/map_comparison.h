@@ -55,6 +55,8 @@ std::vector<Reading> readings_where_wrong(const Recording& recording, const Netw
 
 /// Applies readings and returns how many the map refused (no labelled surface there).
 int touch(Map& map, const Recording& recording, const std::vector<Reading>& readings);
+/// Takes every touch back, exactly.
+void undo_touches(Map& map);
 /// The honest protocol: `count` touches, each at the place that `suggest_touches` ranks first in the map so far; the
 /// truth only draws the reading. Returns how many were made.
 int touch_as_suggested(Map& map, const Recording& recording, int count, uint64_t seed);

@@ -84,7 +84,7 @@ void both_protocols(int regions, bool quick, Checks& checks) {
     run("at random", Places::at_random, kOurs);
     if (quick && touches != 1) continue;
     // Two milliseconds a place: fewer regions, and the same ones where each is touched equally often.
-    const int fewer = quick ? 50 : 500;
+    const int fewer = quick ? 50 : 300;
     const LabelOutcome suggested = simulate_labels(experiment(Places::suggested, kOurs, touches), fewer);
     print_row("by `suggest`, fewer regions", touches, kOurs.name, suggested);
     const LabelOutcome equal = simulate_labels(experiment(Places::everywhere, kOurs, touches), fewer);
@@ -147,7 +147,7 @@ void without_feedback(int regions, Checks& checks) {
 }  // namespace
 
 void material_labels(const Options& options, Checks& checks) {
-  const int regions = options.quick ? 400 : 20000;
+  const int regions = options.quick ? 400 : 6000;
   std::printf("\n## Material labels\n\n%d regions of each class; intervals are 1.96 standard errors.\n", regions);
   both_protocols(regions, options.quick, checks);
   correlated_readings(regions, checks);

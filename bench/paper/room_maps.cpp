@@ -116,9 +116,7 @@ void run_room(int room, const std::string& network_name, const Options& options,
   const Recording recording = furnished_recording(room, options.quick ? 4 : 10);
   const NetworkLabels network =
       network_labels(recording, preset_confusion(network_name, recording.classes), uint64_t(room));
-  const Map counts = fused(recording, network, Evidence::counts);
-  Map ours = fused(recording, network, Evidence::calibrated),
-      suggested = fused(recording, network, Evidence::calibrated);
+  Map counts = fused(recording, network, Evidence::counts), ours = fused(recording, network, Evidence::calibrated);
   const auto record = [&](const char* name, const Map& map, int touches, int refused) {
     figures[name].add(score(map, recording, true));
     figures[name].touches += touches, figures[name].refused += refused;
@@ -126,18 +124,18 @@ void run_room(int room, const std::string& network_name, const Options& options,
   record(kVision, counts, 0, 0);
   record(kCalibrated, ours, 0, 0);
   const std::vector<Reading> once = readings_where_wrong(recording, network, 1, uint64_t(room));
-  Map counts_once = fused(recording, network, Evidence::counts);
-  record(kCountsOne, counts_once, int(once.size()), touch(counts_once, recording, once));
   record(kOne, ours, int(once.size()), touch(ours, recording, once));
   const bool shown = network_name == "medium" || (network_name == "poor" && room == 3);
   if (!options.out.empty() && shown)
     write_png(options.out / ("room" + std::to_string(room) + "_" + network_name + ".png"),
               picture(recording, network, 2, counts, ours));
-  Map three = fused(recording, network, Evidence::calibrated);
+  record(kCountsOne, counts, int(once.size()), touch(counts, recording, once));
+  undo_touches(ours);
   const std::vector<Reading> thrice = readings_where_wrong(recording, network, 3, uint64_t(room));
-  record(kThree, three, int(thrice.size()), touch(three, recording, thrice));
-  const int made = touch_as_suggested(suggested, recording, int(once.size()), uint64_t(room));
-  record(kSuggested, suggested, made, 0);
+  record(kThree, ours, int(thrice.size()), touch(ours, recording, thrice));
+  undo_touches(ours);
+  const int made = touch_as_suggested(ours, recording, int(once.size()), uint64_t(room));
+  record(kSuggested, ours, made, 0);
 }
 
 }  // namespace
