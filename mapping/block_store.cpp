@@ -1,31 +1,11 @@
 #include "mapping/block_store.h"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <cstring>
 #include <mutex>
 #include <numeric>
 
 namespace felt {
-namespace {
-
-/// Planes of one kind come from chunks; a chunk's pages are asked for together, because a map that grows would
-/// otherwise spend more time in page faults than in its planes. `bytes_before`: of the arena before it gave out
-/// `first`.
-template <typename T>
-void touch_new_chunk(T* first, size_t bytes_before, size_t bytes) {
-  if (bytes == bytes_before) return;
-  constexpr uintptr_t kPage = 4096;
-  const auto begin = reinterpret_cast<uintptr_t>(first) & ~(kPage - 1);
-  const auto end = (reinterpret_cast<uintptr_t>(first) + (bytes - bytes_before)) & ~(kPage - 1);
-#ifdef MADV_POPULATE_WRITE
-  // Where the kernel does not know the advice, pages come as they are written.
-  if (end > begin) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_POPULATE_WRITE);
-#endif
-}
-
-}  // namespace
 
 struct BlockStore::Guard {
   std::mutex mutex;
@@ -64,9 +44,7 @@ uint32_t BlockStore::find_or_create(const BlockCoord& coord) {
   if (const uint32_t i = find(coord); i != kNone) return i;
   Block& block = blocks_.emplace_back();
   block.coord = coord;
-  const size_t bytes = geometry_.bytes();
   block.geometry = geometry_.allocate();
-  touch_new_chunk(block.geometry, bytes, geometry_.bytes());
   std::fill_n(block.geometry->tsdf, kBlockVoxels, background_m_);
   std::fill_n(block.geometry->weight, kBlockVoxels, 0.0f);
   const auto number = uint32_t(blocks_.size() - 1);
@@ -82,9 +60,7 @@ uint32_t BlockStore::find_or_create(const BlockCoord& coord) {
 
 ColorPlanes& BlockStore::add_color(Block& block) {
   if (block.color == nullptr) {
-    const size_t bytes = color_.bytes();
     block.color = color_.allocate();
-    touch_new_chunk(block.color, bytes, color_.bytes());
     std::memset(block.color, 0, sizeof(ColorPlanes));
   }
   return *block.color;
@@ -105,9 +81,7 @@ Plane* BlockStore::new_plane() {
   Plane* plane;
   {
     const std::lock_guard lock(planes_guard_->mutex);
-    const size_t bytes = planes_.bytes();
     plane = planes_.allocate();
-    touch_new_chunk(plane, bytes, planes_.bytes());
   }
   std::memset(plane, 0, sizeof(Plane));
   return plane;
