@@ -113,7 +113,6 @@ private:
     T* allocate() {
       if (used_ == kChunk || chunks_.empty()) {
         chunks_.push_back(std::make_unique_for_overwrite<T[]>(kChunk));
-        populate(chunks_.back().get(), kChunk * sizeof(T));
         used_ = 0;
       }
       ++count_;
@@ -130,9 +129,6 @@ private:
   struct Guard;  // a mutex that does not forbid moving the store
 
   void rehash(size_t slots);
-  /// Asks for a new chunk's pages together: a map that grows would otherwise spend more time in page faults than in its
-  /// planes.
-  static void populate(void* chunk, size_t bytes);
 
   float background_m_ = 0;
   std::vector<Block> blocks_;

@@ -272,15 +272,18 @@ void fuse_instances(const BandVoxels& band, const Image<uint16_t>& instances, Bl
   }
 }
 
-/// Lines of planes and images that `band` will need travel meanwhile.
-void prefetch(const BandVoxels& band, const LabelView& view, const Block& block) {
+[[gnu::always_inline]] inline void prefetch(const Plane& plane, uint32_t groups) {
+  for (; groups != 0; groups &= groups - 1)  // a group of floats is a cache line
+    __builtin_prefetch(plane.value + __builtin_ctz(groups) * kGroupVoxels, 1, 3);
+}
+
+/// Lines of planes and images that `band` will need travel meanwhile. Always inline: GCC drops calls of a function that
+/// does nothing but prefetch.
+[[gnu::always_inline]] inline void prefetch(const BandVoxels& band, const LabelView& view, const Block& block) {
   constexpr size_t kMostPlanes = 4;
-  const auto fetch = [&](const Plane* plane) {
-    for (uint32_t rest = band.groups; rest != 0; rest &= rest - 1)  // a group of floats is a cache line
-      __builtin_prefetch(plane->value + __builtin_ctz(rest) * kGroupVoxels, 1, 3);
-  };
-  if (block.even_evidence != nullptr) fetch(block.even_evidence);
-  for (size_t i = 0; i < std::min(kMostPlanes, block.evidence.size()); ++i) fetch(block.evidence[i].counts);
+  if (block.even_evidence != nullptr) prefetch(*block.even_evidence, band.groups);
+  for (size_t i = 0; i < std::min(kMostPlanes, block.evidence.size()); ++i)
+    prefetch(*block.evidence[i].counts, band.groups);
   if (view.probabilities != nullptr && !view.probabilities->empty()) {
     const auto top = size_t(view.probabilities->top);
     for (int i = 0; i < band.count; ++i) {
