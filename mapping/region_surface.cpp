@@ -78,7 +78,10 @@ BlockMask agrees_with_class(const Block& block, const SurfaceRule& rule) {
       total[i] += count[i];
     }
   }
-  return where([&](int i) { return (total[i] > 0) & (1 + own[i] >= rule.class_ratio * (1 + best[i])); });
+  // One label alone must decide: at a ratio of a half, as much belief as half of the strongest is not enough.
+  return where([&](int i) {
+    return (total[i] > 0) & ((own[i] >= best[i]) | (1 + own[i] > rule.class_ratio * (1 + best[i])));
+  });
 }
 
 BlockMask agrees_with_color(const Block& block, const SurfaceRule& rule) {
