@@ -192,8 +192,8 @@ TEST_CASE("every exported mesh says what is believed of each property and where 
 TEST_CASE("a GLB file holds 0 where nothing is known of a property, and says so") {
   const TemporaryDirectory folder;
   Map floor = labelled_map(
-      0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
-      class_table({"wood"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 0 : -1; });
+      0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); }, class_table({"wood"}),
+      [](const Eigen::Vector3d& p) { return p.x() < 0 ? 0 : -1; });
   Property warmth;
   warmth.name = "surface-warmth";
   warmth.priors = {{"wood", {-3, 0.5, 50}}};
