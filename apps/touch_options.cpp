@@ -91,7 +91,9 @@ void RegionOptions::add_to(CLI::App& command) {
       .add_option("--class-ratio", settings.class_ratio,
                   "Least belief in the contact's class against the voxel's strongest, 0 to 1")
       ->capture_default_str();
-  command.add_option("--normal-change", settings.normal_change_deg, "Largest angle between neighbours, degrees; noisy surfaces raise it, to 30 at most")
+  command
+      .add_option("--normal-change", settings.normal_change_deg,
+                  "Largest angle between neighbours, degrees; noisy surfaces raise it, to 30 at most")
       ->capture_default_str();
   command.add_option("--color-change", settings.color_change,
                      "Largest difference from the contact's colour, grey levels");

@@ -36,8 +36,8 @@ void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh);
 
 /// glTF 2.0 in its binary container, colours as linear COLOR_0 on an unlit material: recorded colours hold the light
 /// already. Labels become the attribute _LABEL and each scalar of the vertices one of its own ("friction_mean":
-/// _FRICTION_MEAN), float; where a number is not finite it is written as 0, and _FRICTION_MEAN_KNOWN is 0 there, else 1.
-/// Axes are the map's, which glTF viewers take for y up.
+/// _FRICTION_MEAN), float; where a number is not finite it is written as 0, and _FRICTION_MEAN_KNOWN is 0 there,
+/// else 1. Axes are the map's, which glTF viewers take for y up.
 void write_glb(const std::filesystem::path& path, const TriangleMesh& mesh);
 
 /// One page that shows the mesh in any browser with WebGL 2, without a network: turn, move, come nearer, shading by

@@ -45,7 +45,8 @@ Extent extent_along_rows(const std::array<uint64_t, 8>& candidate) {
   return {kFirstZ + __builtin_ctz(z) - 1, kFirstZ + 31 - __builtin_clz(z) + 2};
 }
 
-/// Calls `visit(first)` for vectors that cover the extent of the row at `row`: some overlap, all stay within z = -1 .. 8.
+/// Calls `visit(first)` for vectors that cover the extent of the row at `row`: some overlap, all stay within z = -1
+/// .. 8.
 template <typename Visit>
 HWY_INLINE void along_row(int row, const Extent& extent, const Visit& visit) {
   const int lanes = int(hn::Lanes(kF)), last = std::max(extent.end - lanes, kFirstZ - 1);
@@ -132,8 +133,8 @@ HWY_INLINE bool within_a_cone(const Planes& p, const FloatVec sum[3], const std:
 
 /// Words of masks, not masks: GCC 12 lets temporaries of 64-byte-aligned types lie at multiples of 32, which
 /// instructions of AVX-512 for aligned data must not meet.
-std::array<uint64_t, 8> interior_voxels(const SurfaceTile& tile, const std::array<uint64_t, 8>& candidate,
-                                        float band_m, float cos_limit) {
+std::array<uint64_t, 8> interior_voxels(const SurfaceTile& tile, const std::array<uint64_t, 8>& candidate, float band_m,
+                                        float cos_limit) {
   const int lanes = int(hn::Lanes(kF));
   if (std::all_of(candidate.begin(), candidate.end(), [](uint64_t word) { return word == 0; })) return candidate;
   const Extent extent = extent_along_rows(candidate);

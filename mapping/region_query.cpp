@@ -57,7 +57,7 @@ private:
     uint32_t block;  ///< store number
     bool examined = false, queued = false;
     std::array<uint32_t, 27> near;  ///< store numbers of the block's neighbours once it was examined
-    BlockMask pending;  ///< bits that reached the block since its last visit
+    BlockMask pending;              ///< bits that reached the block since its last visit
     BlockMask region, grown;
     BlockSurface surface;
   };
@@ -155,7 +155,7 @@ private:
   const Map& map_;
   const SurfaceRule rule_;
   std::vector<uint32_t> number_;  ///< by store number: index of its state
-  std::deque<State> state_;  ///< never moved
+  std::deque<State> state_;       ///< never moved
   std::vector<uint32_t> wave_;
 };
 
@@ -311,7 +311,8 @@ Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const Regio
   snprintf(where, sizeof where, "point (%.3f, %.3f, %.3f)", point_m.x(), point_m.y(), point_m.z());
   const Eigen::Vector3d q = point_m / map.voxel_size_m;
   if (!q.allFinite() || q.array().abs().maxCoeff() > 1e9)
-    throw TouchError(describe_mismatch(where, "contact", "three finite coordinates inside the map", std::string(where).substr(6)));
+    throw TouchError(
+        describe_mismatch(where, "contact", "three finite coordinates inside the map", std::string(where).substr(6)));
   const SurfaceRule band = band_rule(map, settings);
   const double radius = settings.snap_voxels;
   const auto lo = [&](double x) { return int32_t(std::ceil(x - radius)); };

@@ -49,8 +49,8 @@ Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const Regio
 Region find_region(const Map& map, const Contact& contact, const RegionSettings& settings);
 
 /// The largest angle between neighbours of a `connected` region at this contact, degrees: `normal_change_deg`, or where
-/// the surface around the contact is noisy, three times the median angle between neighbouring normals there, at most 30.
-/// A crease stops every region whose limit is below half the angle by which the surface turns (docs/touch.md).
+/// the surface around the contact is noisy, three times the median angle between neighbouring normals there, at
+/// most 30. A crease stops every region whose limit is below half the angle by which the surface turns (docs/touch.md).
 double normal_limit_deg(const Map& map, const Contact& contact, const RegionSettings& settings);
 
 /// The surface voxels seen in the mask: those that project onto a non-zero pixel and are not hidden, by more than two

@@ -78,7 +78,9 @@ BlockMask agrees_with_class(const Block& block, const SurfaceRule& rule) {
       total[i] += count[i];
     }
   }
-  return where([&](int i) { return (total[i] > 0) & (1 + own[i] >= rule.class_ratio * (1 + best[i])); });
+  // One label alone must decide: at a ratio of a half, as much belief as half of the strongest is not enough.
+  return where(
+      [&](int i) { return (total[i] > 0) & ((own[i] >= best[i]) | (1 + own[i] > rule.class_ratio * (1 + best[i]))); });
 }
 
 BlockMask agrees_with_color(const Block& block, const SurfaceRule& rule) {
@@ -135,8 +137,7 @@ BlockSurface examine_block(const BlockNeighbours& near, const SurfaceRule& rule)
 
 BlockNeighbours neighbours_of(const Map& map, const BlockCoord& c) {
   BlockNeighbours near;
-  for (int n = 0; n < 27; ++n)
-    near[size_t(n)] = map.store.get({c.x + n / 9 - 1, c.y + n / 3 % 3 - 1, c.z + n % 3 - 1});
+  for (int n = 0; n < 27; ++n) near[size_t(n)] = map.store.get({c.x + n / 9 - 1, c.y + n / 3 % 3 - 1, c.z + n % 3 - 1});
   return near;
 }
 

@@ -47,8 +47,8 @@ BlockSurface examine_block(const BlockNeighbours& near, const SurfaceRule& rule)
 /// band within eight voxels of it (those ahead of every other voxel). 0 where there are none.
 double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule& rule);
 
-/// Unit normal of the surface at a voxel, towards free space: `smoothed_normal` (mapping/interior_kernels.h). Zero where
-/// there is none.
+/// Unit normal of the surface at a voxel, towards free space: `smoothed_normal` (mapping/interior_kernels.h). Zero
+/// where there is none.
 Eigen::Vector3f surface_normal(const Map& map, const Index3& voxel, float min_weight);
 
 }  // namespace felt

@@ -72,7 +72,8 @@ std::set<Index3> flooded(const Map& map, const Contact& contact, const RegionSet
     if (!in_band(v)) return false;
     const std::vector<float> evidence = voxel_at(map, v, min_weight)->evidence;
     const float most = *std::max_element(evidence.begin(), evidence.end());
-    return most > 0 && 1 + evidence[size_t(contact.slot)] >= float(settings.class_ratio) * (1 + most);
+    const float own = evidence[size_t(contact.slot)];
+    return most > 0 && (own >= most || 1 + own > float(settings.class_ratio) * (1 + most));
   };
   const auto agree = [&](const Index3& a, const Index3& b) {
     const Eigen::Vector3f m = surface_normal(map, a, min_weight), n = surface_normal(map, b, min_weight);

@@ -53,7 +53,8 @@ TEST_CASE("labels of markers keep off the legend, each other and the right end")
     REQUIRE(end != std::string::npos);
     Placed p;
     char anchor[8] = {};
-    REQUIRE(std::sscanf(svg.c_str() + begin, "<text x=\"%lf\" y=\"%lf\" text-anchor=\"%7[a-z]", &p.x, &p.y, anchor) == 3);
+    REQUIRE(std::sscanf(svg.c_str() + begin, "<text x=\"%lf\" y=\"%lf\" text-anchor=\"%7[a-z]", &p.x, &p.y, anchor) ==
+            3);
     p.anchor = anchor;
     return p;
   };
