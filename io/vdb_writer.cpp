@@ -78,6 +78,12 @@ size_t compressed(VdbCodec codec, Scratch& scratch, const char* from, size_t byt
   return libdeflate_zlib_compress(scratch.deflate, from, bytes, to, bytes - 1);
 }
 
+/// Whether the size of values stands before them: not where none of them would be 16-bit floats.
+template <typename Value>
+bool has_size(VdbCodec codec, bool in_16_bits, size_t count) {
+  return codec != VdbCodec::none && (count > 0 || !in_16_bits || !vdb_io::RealToHalf<Value>::isReal);
+}
+
 /// Appends values as the codec has them; returns the end.
 char* put_values(VdbCodec codec, Scratch& scratch, const char* from, size_t bytes, size_t width, char* to) {
   if (codec == VdbCodec::none) {
@@ -145,6 +151,7 @@ char* put_leaf(const BlockMask& active, const Value& background, VdbCodec codec,
   std::memcpy(to, active.word.data(), sizeof active.word);
   to += sizeof active.word;
   *to++ = char(code);
+  if (count == 0 && !has_size<Value>(codec, in_16_bits, count)) return to;
   constexpr size_t kNumber = std::is_same_v<Value, openvdb::Vec3s> ? sizeof(float) : sizeof(Value);
   if (in_16_bits && vdb_io::RealToHalf<Value>::isReal) {
     const size_t bytes = halve(values, count, scratch.halves.data());
@@ -198,9 +205,9 @@ std::string topology(const std::vector<BlockCoord>& coords, const std::vector<ui
   /// An inner node without children yet; returns where the mask of its children is.
   const auto add_node = [&](int log2_dim) {
     const size_t mask_bytes = (size_t(1) << 3 * log2_dim) / 8, at = tree.size();
-    tree.append(2 * mask_bytes, '\0');                       // children, active tiles
-    tree.push_back(char(vdb_io::NO_MASK_OR_INACTIVE_VALS));  // the others hold the background
-    if (codec != VdbCodec::none) append(tree, int64_t(0));   // bytes of active tiles
+    tree.append(2 * mask_bytes, '\0');                                    // children, active tiles
+    tree.push_back(char(vdb_io::NO_MASK_OR_INACTIVE_VALS));               // the others hold the background
+    if (has_size<Value>(codec, in_16_bits, 0)) append(tree, int64_t(0));  // bytes of active tiles
     return at;
   };
   const auto set_child = [&](size_t node, const Index3& child, int log2_dim) {
