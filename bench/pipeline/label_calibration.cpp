@@ -167,6 +167,7 @@ std::vector<Settings> all_settings(double k, bool confusion_too) {
   std::vector<Counting> countings = {{"prior 1", 1, false}, {"prior 0.1", 0.1, false}, {"prior 1/k", 1 / k, false}};
   if (confusion_too) {
     countings.push_back({"confusion matrix, prior 1", 1, true});
+    countings.push_back({"confusion matrix, prior 0.1", 0.1, true});
     countings.push_back({"confusion matrix, prior 1/k", 1 / k, true});
   }
   std::vector<Settings> all;
@@ -178,7 +179,6 @@ std::vector<Settings> all_settings(double k, bool confusion_too) {
       all.push_back(s);
     };
     with("", [](LabelConfig&) {});
-    if (c.prior == 0.1) continue;
     for (const float evidence : {0.1f, 0.3f})
       with(", evidence " + std::to_string(evidence).substr(0, 3), [&](LabelConfig& l) { l.evidence = evidence; });
     for (const float cap : {5.0f, 10.0f, 20.0f, 50.0f})
