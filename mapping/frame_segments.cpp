@@ -29,36 +29,6 @@ void prepare(const DepthImage& depth_m, const FrameSegmentSettings& s, FrameSegm
   }
 }
 
-/// Noise of the measured depth over the distance between neighbouring pixels on a surface that faces the camera: from
-/// the second differences along rows, which a smooth surface hardly has.
-float noise_per_pixel(const Grid& grid, double fx, std::vector<float>& sample) {
-  constexpr int kEvery = 8;  // rows, and pixels of a row
-  sample.clear();
-  for (int v = 0; v < grid.h; v += kEvery)
-    for (int u = 1; u + 1 < grid.w; u += kEvery) {
-      const float *const d = grid.depth + size_t(v) * size_t(grid.w) + u, before = d[-1] - d[0], after = d[1] - d[0];
-      const float limit = grid.step[d - grid.depth];
-      if (std::fabs(before) < limit && std::fabs(after) < limit) sample.push_back(std::fabs(before + after) / d[0]);
-    }
-  if (sample.empty()) return 0;
-  const auto middle = sample.begin() + std::ptrdiff_t(sample.size() / 2);
-  std::nth_element(sample.begin(), middle, sample.end());
-  // Of Gaussian noise the median of its size is 0.6745 sigma; a second difference has sqrt(6) times the noise.
-  return float(double(*middle) * fx / (0.6745 * std::sqrt(6.0)));
-}
-
-/// Widens smoothing and differences until the noise of a normal is well below the angle that parts segments: sensors of
-/// few pixels see more noise from one pixel to the next than slope.
-void adapt_to_noise(double noise, Grid& grid) {
-  constexpr double kLargestNoise = 0.1;  // radians, before normals are smoothed
-  constexpr int kMostWider = 4;
-  for (int i = 0; i < kMostWider; ++i) {
-    const double noise_of_slope = noise * std::numbers::sqrt2 / ((2 * grid.smoothing + 1) * 2 * grid.difference);
-    if (noise_of_slope <= kLargestNoise) return;
-    ++grid.smoothing, ++grid.difference;
-  }
-}
-
 /// Mean of `value` over the pixels up to `smoothing` to either side whose depth is within the pixel's step of its own,
 /// along rows (`stride` 1) or columns (`stride` w).
 void smooth_along(const Grid& grid, const float* value, std::ptrdiff_t stride, float* out) {
@@ -302,8 +272,7 @@ Image<uint16_t> frame_segments(const DepthImage& depth_m, const PinholeCamera& c
   prepare(depth_m, settings, scratch);
   // Chosen on 640 pixels across: a pixel of a smaller image covers more of the surface.
   const auto pixels = [&](double at_640) { return std::max(1, int(std::lround(at_640 * w / 640))); };
-  Grid grid{w, h, pixels(2), pixels(3), scratch.depth.data(), scratch.step.data()};
-  adapt_to_noise(double(noise_per_pixel(grid, camera.fx, scratch.spare)), grid);
+  const Grid grid{w, h, pixels(2), pixels(3), scratch.depth.data(), scratch.step.data()};
   scratch.smooth.resize(depth_m.size());
   scratch.spare.resize(depth_m.size());
   smooth_along(grid, grid.depth, 1, scratch.spare.data());

@@ -75,20 +75,12 @@ std::optional<Thing> thing_at(const Recording& recording, const Eigen::Vector3d&
   return thing;
 }
 
-/// Regions of maps of a few noisy frames: neighbouring voxels of one surface differ by more than the default allows.
-RegionSettings few_noisy_frames() {
-  RegionSettings settings;
-  settings.normal_change_deg = 45;
-  return settings;
-}
-
 bool touched(Map& map, const Recording& recording, const Reading& reading, double stamp_s) {
   TouchRequest request;
   request.stamp_s = stamp_s;
   request.point_m = reading.point_m;
   request.property = recording.property.name;
   request.value = reading.value;
-  request.region = few_noisy_frames();
   try {
     add_touch(map, resolve_touch(map, request));
     return true;
@@ -183,7 +175,6 @@ void undo_touches(Map& map) {
 int touch_as_suggested(Map& map, const Recording& recording, int count, uint64_t seed) {
   SuggestionSettings settings;
   settings.most = 50;
-  settings.region = few_noisy_frames();
   std::map<Thing, int> times;
   int made = 0;
   for (int i = 0; i < count; ++i) {

@@ -110,18 +110,6 @@ TEST_CASE("noise and small pieces do not break a wall, however the working memor
   CHECK(segments == frame_segments(depth, kCamera));
 }
 
-TEST_CASE("a sensor of few pixels, whose noise exceeds the slope between them, gives whole walls", "[segments]") {
-  // A room's corner at 3 m, where neighbouring pixels are 2 cm apart.
-  Random random(5);
-  const Eigen::Vector3d left = Eigen::Vector3d(-1, 0, 1).normalized(), right = Eigen::Vector3d(1, 0, 1).normalized();
-  DepthImage depth = planes({{left, 3 * left.z()}, {right, 3 * right.z()}});
-  for (float& d : depth) d += float(random.between(-0.02, 0.02));
-  const Image<uint16_t> segments = frame_segments(depth, kCamera);
-  CHECK(purity(segments, [](int u, int) { return u < 74; }) > 0.95);
-  CHECK(purity(segments, [](int u, int) { return u > 85; }) > 0.95);
-  CHECK(segments(30, 60) != segments(130, 60));
-}
-
 TEST_CASE("colour parts a surface where it counts", "[segments]") {
   const DepthImage depth(kWidth, kHeight, 1.2f);
   ColorImage color(kWidth, kHeight, {90, 90, 90, 255});
