@@ -75,10 +75,15 @@ void speed(const Settings& settings, const std::vector<Frame>& frames) {
                 bench::median(best[e]) / ours);
 }
 
+/// Its mesher ends the program on an assertion of Open3D 0.16 (linear_idx_e > 0, where 0 is a voxel too) on the rendered
+/// house; blocks of 8^3 give the same surface.
+constexpr const char* kAborts = "Open3D VoxelBlockGrid 16^3";
+
 void surface_table(const char* scene, const Settings& settings, const std::vector<Frame>& frames,
                    const std::function<std::vector<float>(const std::vector<Eigen::Vector3f>&)>& error_m) {
   auto all = engines(settings);
   for (auto& engine : all) {
+    if (engine->name() == kAborts) continue;
     for (const Frame& frame : frames) engine->prepare(frame);
     for (size_t n = 0; n < frames.size(); ++n) engine->integrate(n);
     const std::vector<Eigen::Vector3f> points = engine->surface();
