@@ -1,5 +1,6 @@
 // Region query on a flat floor, a rippled and a noisy one, against OpenVDB's own segmentation of the same voxels.
 #include <benchmark/benchmark.h>
+#include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetUtil.h>
 #include <tbb/global_control.h>
 #include <vector>

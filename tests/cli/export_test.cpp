@@ -299,47 +299,4 @@ TEST_CASE("a compact VDB holds the chosen grids in 16 bits, for a reader that is
   CHECK_THAT(unknown.err, Contains("'colour'") && Contains("evidence/ice"));
 }
 
-TEST_CASE("info counts in every grid what a reader that is not ours finds in the file") {
-  const TouchedFloor floor;
-  const CommandResult result = run_feltmap("info --grids --json " + quoted(floor.map));
-  REQUIRE(result.exit_code == 0);
-  const json grids = json::parse(result.out).at("grids");
-  auto stock = lines_of("stock_vdb_reader", floor.map);
-  CHECK(grids.size() == stock.size());
-  CHECK(grids.contains("touched"));
-  CHECK(grids.contains("property/friction/ice/kappa"));
-  for (const auto& [name, found] : grids.items()) {
-    INFO(name);
-    REQUIRE(stock.contains(name));
-    CHECK(std::to_string(found.at("active_voxels").get<uint64_t>()) == stock[name][2]);
-    if (!found.contains("least")) continue;
-    CHECK(found.at("least").get<double>() == Approx(std::stod(stock[name][4])).epsilon(1e-5));
-    CHECK(found.at("greatest").get<double>() == Approx(std::stod(stock[name][5])).epsilon(1e-5));
-    CHECK(found.at("mean") >= found.at("least"));
-    CHECK(found.at("mean") <= found.at("greatest"));
-  }
-}
-
-TEST_CASE("a compact map file is the same map in fewer bytes") {
-  const TouchedFloor floor;
-  const fs::path compact = floor.directory.path() / "compact.vdb";
-  floor.exported("--vdb " + quoted(compact) + " --compact");
-  CHECK(map_hash(load_map(compact)) == map_hash(load_map(floor.map)));
-  CHECK(fs::file_size(compact) < fs::file_size(floor.map) / 2);
-  CHECK(run_feltmap("diff " + quoted(compact) + " " + quoted(floor.map)).exit_code == 0);
-}
-
-TEST_CASE("a photographed surface keeps its colours in a GLB file") {
-  const TemporaryDirectory directory;
-  const fs::path out = directory.path() / "out", file = directory.path() / "boxes.glb";
-  REQUIRE(run_feltmap("reconstruct " + quoted(boxes()) + " --out " + quoted(out) + " --quiet --voxel-size 0.05")
-              .exit_code == 0);
-  const CommandResult result =
-      run_feltmap("export --json " + quoted(out / "map.vdb") + " --color-by rgb --mesh " + quoted(file));
-  REQUIRE(result.exit_code == 0);
-  auto found = lines_of("stock_glb_reader", file);
-  REQUIRE(found.contains("COLOR_0"));
-  CHECK(found["COLOR_0"][2] == json::parse(result.out)["mesh"]["vertices"].dump());
-}
-
 }  // namespace felt::test
