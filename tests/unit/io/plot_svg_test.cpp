@@ -40,7 +40,7 @@ TEST_CASE("the ends of a curve lie on the ends of the axes") {
 }
 
 TEST_CASE("labels of markers keep off the legend, each other and the right end") {
-  Plot plot{"", "", "", {}, {{0, "contact"}, {0.1, "slip"}, {9, "release"}, {10, "end"}}};
+  Plot plot{"", "", "", {}, {{0, "contact"}, {0.1, "slip"}, {9.7, "release"}, {10, "end"}}};
   plot.series.push_back({"normal", {0, 10}, {0, 1}});
   plot.series.push_back({"tangential", {0, 10}, {1, 1}});
   const std::string svg = plot_svg({plot}, 1, 400, 300);
