@@ -9,6 +9,7 @@
 #include "apps/exit_code.h"
 #include "core/error.h"
 #include "core/simd.h"
+#include "io/system_memory.h"
 
 namespace felt::apps {
 namespace {
@@ -68,6 +69,7 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   using namespace felt::apps;
   try {
+    felt::keep_freed_memory();
     felt::apply_simd_choice();
     return run(argc, argv);
   } catch (const felt::ConfigError& e) {

@@ -15,6 +15,7 @@
 
 #include "io/decode_ahead.h"
 #include "io/open_sequence.h"
+#include "io/system_memory.h"
 
 namespace {
 namespace fs = std::filesystem;
@@ -43,6 +44,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: bench_reconstruct_against_decode FELTMAP SEQUENCE [threads] [rounds]\n");
     return 2;
   }
+  felt::keep_freed_memory();  // as the command does
   const std::string sequence = argv[2];
   const int threads = argc > 3 ? std::atoi(argv[3]) : 2, rounds = argc > 4 ? std::atoi(argv[4]) : 7;
   const fs::path out = fs::temp_directory_path() / "feltmap-bench-reconstruct";
