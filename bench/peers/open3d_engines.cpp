@@ -68,7 +68,7 @@ public:
   void integrate(size_t n) override { volume_.Integrate(images_[n], camera_, extrinsic_[n]); }
   std::vector<Eigen::Vector3f> surface() override {
     std::vector<Eigen::Vector3f> out;
-    for (const auto& p : volume_.ExtractTriangleMesh()->vertices_) out.push_back(p.cast<float>());
+    for (const auto& p : volume_.ExtractPointCloud()->points_) out.push_back(p.cast<float>());
     return out;
   }
 

@@ -64,6 +64,20 @@ Roughness mean_roughness(const std::vector<DepthImage>& depths, bool swapped, do
   return mean;
 }
 
+/// Of neighbouring pixels with different numbers, the share whose three lowest bits agree: by chance an eighth.
+double share_of_equal_low_bits(const std::vector<DepthImage>& depths, double scale) {
+  size_t different = 0, equal = 0;
+  for (const DepthImage& depth : depths)
+    for (size_t i = 0; i + 1 < depth.size(); i += 2) {
+      if (!(depth.data()[i] > 0 && depth.data()[i + 1] > 0)) continue;
+      const long here = std::lround(depth.data()[i] * scale), beside = std::lround(depth.data()[i + 1] * scale);
+      if (here == beside) continue;
+      ++different;
+      equal += (here - beside) % 8 == 0;
+    }
+  return different == 0 ? 0 : double(equal) / double(different);
+}
+
 std::string percent(double share) { return number_text(100 * share, "%.2g") + " %"; }
 
 struct Size {
@@ -153,12 +167,17 @@ std::vector<Finding> check_depth_images(const std::filesystem::path& path, const
   // otherwise.
   // Where bits are rotated, numbers run over: beside the largest stands one near 0. No surface does that.
   const bool runs_over = as_read.wraps > 0.001 && otherwise_read.wraps < 0.1 * as_read.wraps;
-  if ((as_read.across > 0.05 || runs_over) && other_across < 0.4 * as_read.across) {
+  // Three bits rotated downwards are the highest of depth, which surfaces rarely change.
+  const double low_bits = rotated_now ? 0 : share_of_equal_low_bits(now, listing.depth_scale);
+  const bool high_bits_below = low_bits > 0.9 && other_across <= as_read.across;
+  if (high_bits_below || ((as_read.across > 0.05 || runs_over) && other_across < 0.4 * as_read.across)) {
     encoding.faulty = true;
     encoding.belief = rotated_now ? "depth is stored as plain numbers"
                                   : "the bits of depth are rotated by three (picking challenge, SUN RGB-D)";
     if (runs_over) encoding.evidence += ", " + percent(as_read.wraps) + " from near 0 to near the largest number";
-    encoding.evidence += ", but " + percent(other_across) + " read so";
+    if (high_bits_below)
+      encoding.evidence += ", the three lowest bits of " + percent(low_bits) + " of different neighbours agree, and ";
+    encoding.evidence += (high_bits_below ? "" : ", but ") + percent(other_across) + " read so";
     encoding.remedy = rotated_now ? "--depth-encoding plain" : "--depth-encoding rotated3 --depth-scale 10000";
     if (rotated_now != (listing.depth_scale == 10000)) other.depth_scale = rotated_now ? 1000 : 10000;
     listing = other;
