@@ -15,6 +15,7 @@
 #include "mapping/region_query.h"
 #include "mapping/region_surface.h"
 #include "tests/support/labelled_map.h"
+#include "tests/support/region_voxels.h"
 #include "tests/support/simd_targets.h"
 
 using namespace felt;
@@ -101,16 +102,6 @@ std::set<Index3> flooded(const Map& map, const Contact& contact, const RegionSet
     for_each_neighbour(v, reach);
   }
   return region;
-}
-
-std::set<Index3> voxels_of(const Region& region) {
-  std::set<Index3> voxels;
-  for (size_t b = 0; b < region.blocks(); ++b)
-    for_each_bit(region.mask[b], [&](int i) {
-      const Index3 f = first_voxel(region.coord[b]), v = voxel_of_offset(i);
-      voxels.insert({f.x + v.x, f.y + v.y, f.z + v.z});
-    });
-  return voxels;
 }
 
 /// Random surface voxels in random directions, some unobserved.

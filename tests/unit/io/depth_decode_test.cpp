@@ -11,6 +11,7 @@
 #include "io/image_encode.h"
 #include "io/open_sequence.h"
 #include "tests/support/data.h"
+#include "tests/support/image_fault.h"
 #include "tests/support/recorded_sequence.h"
 
 using namespace felt;
@@ -20,16 +21,6 @@ namespace fs = std::filesystem;
 namespace {
 
 using Bytes = std::vector<uint8_t>;
-
-template <typename Decode>
-std::string reason_of(Decode decode) {
-  try {
-    decode();
-  } catch (const ImageError& fault) {
-    return fault.reason();
-  }
-  return {};
-}
 
 /// An array of NumPy, version 1, with its values as they lie in memory.
 Bytes npy(const std::string& header, const Bytes& values) {

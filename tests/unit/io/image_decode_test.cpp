@@ -6,21 +6,12 @@
 
 #include "io/image_encode.h"
 #include "io/png_decode.h"
+#include "tests/support/image_fault.h"
 
 using namespace felt;
+using felt::test::reason_of;
 
 namespace {
-
-/// Reason of the ImageError that `decode` throws; empty where it accepts.
-template <typename Decode>
-std::string reason_of(Decode decode) {
-  try {
-    decode();
-  } catch (const ImageError& fault) {
-    return fault.reason();
-  }
-  return {};
-}
 
 Image<uint16_t> random_gray(int width, int height) {
   std::mt19937 random(uint32_t(width * 31 + height));

@@ -9,6 +9,7 @@
 
 #include "mapping/region_query.h"
 #include "tests/support/labelled_map.h"
+#include "tests/support/region_voxels.h"
 
 using namespace felt;
 using namespace felt::test;
@@ -26,16 +27,6 @@ Region random_region(uint32_t seed) {
     region.append(c, bits);
   }
   return region;
-}
-
-std::set<Index3> voxels_of(const Region& region) {
-  std::set<Index3> voxels;
-  for (size_t b = 0; b < region.blocks(); ++b)
-    for_each_bit(region.mask[b], [&](int i) {
-      const Index3 f = first_voxel(region.coord[b]), v = voxel_of_offset(i);
-      voxels.insert({f.x + v.x, f.y + v.y, f.z + v.z});
-    });
-  return voxels;
 }
 
 constexpr double kVoxel = 0.02;
