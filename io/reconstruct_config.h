@@ -26,8 +26,7 @@ struct ReconstructConfig {
   std::optional<bool> color;
   std::optional<double> voxel_size_m;
   std::optional<std::string> truncation;  ///< "0.08" (metres) or "4vox"
-  std::optional<double> min_depth_m, max_depth_m, max_weight, dropoff_start_vox,
-      color_band_vox;
+  std::optional<double> min_depth_m, max_depth_m, max_weight, dropoff_start_vox, color_band_vox;
   std::optional<DistanceModel> distance;
   std::optional<WeightModel> weight;
   std::optional<bool> carve;

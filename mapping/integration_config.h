@@ -46,7 +46,8 @@ struct IntegrationConfig {
   float dropoff_start_vox = 1.0f;
   /// Also fuse "free" (+truncation) into observed voxels in front of the band, as far as blocks exist.
   bool carve = false;
-  /// Voxels nearer than this to the surface, in voxels, take colour: those that colour of the mesh is interpolated from.
+  /// Voxels nearer than this to the surface, in voxels, take colour: those that colour of the mesh is interpolated
+  /// from.
   float color_band_vox = 2.0f;
   LabelConfig labels;
 };

@@ -69,8 +69,8 @@ private:
   /// The blocks that the cells of one block reach into.
   struct Neighbourhood {
     bool known = false;
-    BlockCoord coord;                                ///< of the block of the cells' first corners
-    std::array<uint32_t, 8> block;                   ///< that block moved by (c >> 2, c >> 1 & 1, c & 1), or kNone
+    BlockCoord coord;                               ///< of the block of the cells' first corners
+    std::array<uint32_t, 8> block;                  ///< that block moved by (c >> 2, c >> 1 & 1, c & 1), or kNone
     std::array<const GeometryPlanes*, 8> geometry;  ///< theirs, or null
   };
   /// The eight voxels around a cell.

@@ -33,8 +33,9 @@ bool project(const PinholeCamera& camera, const Matrix3d& R_camera_world, const 
   // How far the corner that is farthest in lies within each edge of the image, times its depth.
   double in_left = -inf, in_right = -inf, in_top = -inf, in_bottom = -inf;
   for (int c = 0; c < 8; ++c) {
-    const Vector3d p = low + kSide * (double(c >> 2) * R_camera_world.col(0) + double(c >> 1 & 1) * R_camera_world.col(1) +
-                                      double(c & 1) * R_camera_world.col(2));
+    const Vector3d p =
+        low + kSide * (double(c >> 2) * R_camera_world.col(0) + double(c >> 1 & 1) * R_camera_world.col(1) +
+                       double(c & 1) * R_camera_world.col(2));
     const double z = p.z(), u = camera.fx * p.x() + camera.cx * z, v = camera.fy * p.y() + camera.cy * z;
     in_left = std::max(in_left, u + z), in_right = std::max(in_right, width * z - u);
     in_top = std::max(in_top, v + z), in_bottom = std::max(in_bottom, height * z - v);

@@ -17,8 +17,8 @@ namespace felt {
 struct DepthView {
   const float* depth_m = nullptr;  ///< width * height; NaN, infinite and out-of-range values are ignored
   const float* scale = nullptr;  ///< width * height: what (d - z) is multiplied with, or null for 1; 0: pixel unusable
-  bool along_ray =
-      false;  ///< (d - z) is multiplied with |r|, r = (x/z, y/z, 1) of the voxel's own centre; not with `scale`
+  /// (d - z) is multiplied with |r|, r = (x/z, y/z, 1) of the voxel's own centre; not together with `scale`.
+  bool along_ray = false;
   int width = 0, height = 0;
   double first[3][4] = {};  ///< row c: (hu, hv, z) of world voxel index (i, j, k): first[c] . (i, j, k, 1)
   alignas(64) float plane[3][64] = {};

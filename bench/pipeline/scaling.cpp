@@ -1,6 +1,6 @@
 // How the cost of a frame and the size of the map grow with voxel size, resolution, number of frames, number of classes
-// and threads: tables, and one picture of the curves. Voxels are those of the blocks in view (cost) and of the blocks of
-// the map (bytes).
+// and threads: tables, and one picture of the curves. Voxels are those of the blocks in view (cost) and of the blocks
+// of the map (bytes).
 //   bench_scaling [picture.svg]
 #include <tbb/global_control.h>
 
@@ -112,7 +112,8 @@ int main(int argc, char** argv) {
               simd_name().c_str());
   std::vector<Plot> plots;
 
-  std::printf("\n| voxel, cm | threads | ms a frame | ns a voxel | map, MB | bytes a voxel |\n|---|---|---|---|---|---|\n");
+  std::printf(
+      "\n| voxel, cm | threads | ms a frame | ns a voxel | map, MB | bytes a voxel |\n|---|---|---|---|---|---|\n");
   Curve by_voxel("Voxel size", "voxel, cm", "ms a frame", true);
   for (const double cm : {5.0, 3.0, 2.0, 1.5, 1.0})
     for (const size_t threads : {1, 2}) {
@@ -133,7 +134,9 @@ int main(int argc, char** argv) {
   }
   plots.push_back(by_pixels.plot);
 
-  std::printf("\n| frames of the same path, 2 cm voxels | ms a frame | ns a voxel | map, MB | bytes a voxel |\n|---|---|---|---|---|\n");
+  std::printf(
+      "\n| frames of the same path, 2 cm voxels | ms a frame | ns a voxel | map, MB | bytes a voxel "
+      "|\n|---|---|---|---|---|\n");
   Curve by_frames("Frames", "frames", "ms a frame, map MB", true);
   for (const int n : {10, 20, 40, 80, 160}) {
     const Cost c = fuse(without_labels(room(n, 320, 240)), 0.02, 1);

@@ -115,7 +115,8 @@ TEST_CASE("where the nearest voxel has no class, the pixel is that of the neares
   Map map(0.02, 0.08);
   map.classes = ClassTable({{1, "wall", {}, false}});
   test::fill_map(map, {-30, -30, 40}, {30, 30, 60}, [](const Vector3d& p) { return 1.006 - p.z(); });
-  // Beside the optical axis the surface is at (0.2, 0.2, 50.3) voxels: nearest is (0, 0, 50), then (1, 0, 50) and so on.
+  // Beside the optical axis the surface is at (0.2, 0.2, 50.3) voxels: nearest is (0, 0, 50), then (1, 0, 50) and so
+  // on.
   const auto label = [&map](const Index3& v) {
     Block& block = map.store[map.store.find(block_of_voxel(v))];
     if (block.evidence.empty()) block.evidence = {{0, map.store.new_plane()}};
