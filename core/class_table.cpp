@@ -25,12 +25,10 @@ ClassTable::ClassTable(std::vector<ClassInfo> classes) : classes_(std::move(clas
       known_.resize(c.id + 1, false);
     }
     known_[c.id] = true;
-    if (!(c.prior > 0) || !std::isfinite(c.prior))
+    if (c.prior && (!(*c.prior > 0) || !std::isfinite(*c.prior)))
       problems.push_back("class table: prior of '" + c.name + "': expected a number above 0, found " +
-                         std::to_string(c.prior));
+                         std::to_string(*c.prior));
     if (!c.ignore) {
-      prior_total_ += c.prior;
-      even_prior_ = even_prior_ && (by_slot_.empty() || c.prior == classes_[by_slot_[0]].prior);
       slot_of_id_[c.id] = uint16_t(by_slot_.size());
       by_slot_.push_back(uint32_t(row));
     }
@@ -39,6 +37,21 @@ ClassTable::ClassTable(std::vector<ClassInfo> classes) : classes_(std::move(clas
     problems.push_back("class table: classes: expected at least one class that is not ignored, found none of " +
                        std::to_string(classes_.size()));
   if (!problems.empty()) throw ConfigError(problems);
+  for (int slot = 0; slot < size(); ++slot) {
+    prior_total_ += prior(slot);
+    even_prior_ = even_prior_ && prior(slot) == prior(0);
+  }
+}
+
+bool ClassTable::operator==(const ClassTable& other) const {
+  const auto prior_of = [](const ClassTable& table, const ClassInfo& c) {
+    return c.ignore ? 0 : c.prior.value_or(default_prior(table.size()));
+  };
+  return std::equal(classes_.begin(), classes_.end(), other.classes_.begin(), other.classes_.end(),
+                    [&](const ClassInfo& a, const ClassInfo& b) {
+                      return a.id == b.id && a.name == b.name && a.color == b.color && a.ignore == b.ignore &&
+                             prior_of(*this, a) == prior_of(other, b);
+                    });
 }
 
 std::optional<int> ClassTable::slot_of_name(const std::string& name) const {

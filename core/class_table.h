@@ -15,8 +15,8 @@ struct ClassInfo {
   std::string name;
   Rgba8 color;          ///< of views and meshes
   bool ignore = false;  ///< its pixels carry no label
-  double prior = 1;     ///< Dirichlet concentration before anything was seen, above 0
-  bool operator==(const ClassInfo&) const = default;
+  /// Dirichlet concentration before anything was seen, above 0; none: `ClassTable::default_prior`.
+  std::optional<double> prior = {};
 };
 
 /// The classes of a map. A class's *slot* is its position among the classes that are not ignored: 0 .. k-1, the index
@@ -37,13 +37,17 @@ public:
   /// Slot of a label id, kNoSlot for ignored and unknown ids (`known` tells them apart).
   uint16_t slot_of_id(uint16_t id) const { return id < slot_of_id_.size() ? slot_of_id_[id] : kNoSlot; }
   bool known(uint16_t id) const { return id < known_.size() && known_[id]; }
-  double prior(int slot) const { return at_slot(slot).prior; }
+  double prior(int slot) const { return at_slot(slot).prior.value_or(default_prior(size())); }
+  /// The paper's 1 for up to eight classes (its table has eight); beyond, eight counts shared by all k of them, so that
+  /// classes nobody saw do not outweigh what frames say (docs/adr/0008).
+  static double default_prior(int k) { return k > 8 ? 8.0 / k : 1; }
   double prior_total() const { return prior_total_; }
   /// Whether all classes have one prior: sums over classes without evidence are then a product.
   bool even_prior() const { return even_prior_; }
   std::optional<int> slot_of_name(const std::string& name) const;
   bool empty() const { return classes_.empty(); }
-  bool operator==(const ClassTable& other) const { return classes_ == other.classes_; }
+  /// Equal classes with equal priors, whether these were given or are the default.
+  bool operator==(const ClassTable& other) const;
 
 private:
   std::vector<ClassInfo> classes_;

@@ -169,7 +169,7 @@ std::string class_table_yaml(const ClassTable& classes) {
   for (const ClassInfo& c : classes.classes()) {
     text << "  - {id: " << c.id << ", name: " << quoted_name(c.name) << ", color: [" << int(c.color.r) << ", "
          << int(c.color.g) << ", " << int(c.color.b) << "]" << (c.ignore ? ", ignore: true" : "");
-    if (c.prior != 1) text << ", prior: " << c.prior;
+    if (c.prior) text << ", prior: " << *c.prior;
     text << "}\n";
   }
   return text.str();

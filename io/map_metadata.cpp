@@ -32,7 +32,9 @@ json classes_to_json(const ClassTable& table) {
   for (const ClassInfo& c : table.classes()) {
     rows.push_back(
         {{"id", c.id}, {"name", c.name}, {"color", {c.color.r, c.color.g, c.color.b}}, {"ignore", c.ignore}});
-    if (c.prior != 1) rows.back()["prior"] = c.prior;
+    // Always a number, never "the default": what a map believes must not change with a default. None in a file is 1.
+    const double prior = c.prior.value_or(ClassTable::default_prior(table.size()));
+    if (prior != 1) rows.back()["prior"] = prior;
   }
   return rows;
 }

@@ -180,8 +180,9 @@ bool observe(const BlockCoord& block, const DepthView& view, BlockObservation& o
       store_bits(inside, i, out.valid);
       hn::Store(z, kF, out.sdf_m + i);
       if constexpr (kFactor == Factor::ray) {  // kept where the weight will be: it is asked for once depth is there
-        const FloatVec x = hn::Mul(hn::Sub(u, centre_u), inverse_fx), y = hn::Mul(hn::Sub(v, centre_v), inverse_fy);
-        hn::Store(hn::Sqrt(hn::Add(hn::Add(one, hn::Mul(x, x)), hn::Mul(y, y))), kF, out.weight + i);
+        const FloatVec ray_x = hn::Mul(hn::Sub(u, centre_u), inverse_fx);
+        const FloatVec ray_y = hn::Mul(hn::Sub(v, centre_v), inverse_fy);
+        hn::Store(hn::Sqrt(hn::Add(hn::Add(one, hn::Mul(ray_x, ray_x)), hn::Mul(ray_y, ray_y))), kF, out.weight + i);
       }
       hn::Store(hn::IfThenElseZero(hn::RebindMask(kI, inside), index), kI, out.pixel + i);
     }

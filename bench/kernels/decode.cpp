@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "io/depth_decode.h"
 #include "io/image_decode.h"
 #include "io/text_input.h"
 
@@ -73,6 +74,30 @@ felt::ColorImage color_by_opencv(const std::string& file) {
 
 felt::ColorImage color_by_us(const std::string& file) { return felt::decode_color(bytes_of(file), "benchmark"); }
 
+/// Rendered depth in metres, stored by OpenCV as floating-point TIFF or EXR.
+Files as_float_files(const Files& pngs, const std::string& ending, const std::vector<int>& parameters) {
+  Files files;
+  for (const std::string& png : pngs) {
+    cv::Mat metres;
+    opencv_decoded(png, cv::IMREAD_UNCHANGED).convertTo(metres, CV_32F, 1 / 6553.5);
+    std::vector<uint8_t> bytes;
+    cv::imencode(ending, metres, bytes, parameters);
+    files.emplace_back(bytes.begin(), bytes.end());
+  }
+  return files;
+}
+
+felt::Image<float> metres_by_opencv(const std::string& file) {
+  const cv::Mat mat = opencv_decoded(file, cv::IMREAD_UNCHANGED);
+  felt::Image<float> image(mat.cols, mat.rows);
+  for (int v = 0; v < mat.rows; ++v) std::copy_n(mat.ptr<float>(v), mat.cols, image.row(v));
+  return image;
+}
+
+felt::Image<float> metres_by_us(const std::string& file) {
+  return std::get<felt::Image<float>>(felt::decode_depth(bytes_of(file), "benchmark"));
+}
+
 template <typename Decode>
 void time_decoder(const std::string& name, const Files& files, Decode decode) {
   benchmark::RegisterBenchmark(name.c_str(), [&files, decode](benchmark::State& state) {
@@ -100,6 +125,7 @@ void require_equal(const std::string& what, const Files& files, Decode ours, Dec
 }  // namespace
 
 int main(int argc, char** argv) {
+  setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1);  // OpenCV leaves it off
   benchmark::Initialize(&argc, argv);
   const char* data = std::getenv("FELTMAP_DATA");
   if (data == nullptr) {
@@ -128,6 +154,16 @@ int main(int argc, char** argv) {
     require_equal<felt::ColorImage (*)(const std::string&)>(name, *files, color_by_us, color_by_opencv);
     time_decoder(std::string(name) + "/opencv", *files, color_by_opencv);
     time_decoder(std::string(name) + "/feltmap", *files, color_by_us);
+  }
+  static const Files tiff = as_float_files(rendered, ".tiff", {cv::IMWRITE_TIFF_COMPRESSION, 8}),
+                     exr = as_float_files(rendered, ".exr", {});
+  const std::pair<const char*, const Files*> float_sets[] = {{"depth_tiff/rendered", &tiff},
+                                                             {"depth_exr/rendered", &exr}};
+  for (const auto& [name, files] : float_sets) {
+    if (files->empty()) continue;
+    require_equal<felt::Image<float> (*)(const std::string&)>(name, *files, metres_by_us, metres_by_opencv);
+    time_decoder(std::string(name) + "/opencv", *files, metres_by_opencv);
+    time_decoder(std::string(name) + "/feltmap", *files, metres_by_us);
   }
   benchmark::RunSpecifiedBenchmarks();
   return 0;

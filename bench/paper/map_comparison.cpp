@@ -117,8 +117,7 @@ NetworkLabels network_labels(const Recording& recording, const ConfusionMatrix& 
 
 Map fused(const Recording& recording, const NetworkLabels& network, Evidence evidence) {
   Map map(recording.voxel_size_m, 4 * recording.voxel_size_m);
-  map.classes = evidence == Evidence::calibrated ? with_prior(recording.classes, 1.0 / recording.classes.size())
-                                                 : recording.classes;
+  map.classes = with_prior(recording.classes, evidence == Evidence::calibrated ? 1.0 / recording.classes.size() : 1);
   map.properties = PropertyTable({recording.property});
   IntegrationConfig config;
   config.max_depth_m = float(recording.max_depth_m);

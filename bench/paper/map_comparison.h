@@ -27,7 +27,7 @@ ClassTable with_prior(const ClassTable& classes, double prior);
 
 /// How a map takes the network's labels.
 enum class Evidence {
-  counts,  ///< one count a pixel for its label: what semantic mappers do
+  counts,  ///< one count a pixel for its label on the paper's prior of 1: what semantic mappers do
   /// P(true class | label) from the network's confusion and the classes' shares, on a prior of one count for all
   /// classes together: the frames repeat one judgement, and its probabilities are to stand.
   calibrated,

@@ -79,7 +79,7 @@ void icl_living_room(const Options& options, Checks& checks) {
   double ece_of_counts = 0;
   for (const bool calibrated : {false, true}) {
     Map map(0.02, 0.08);
-    map.classes = calibrated ? with_prior(classes, 1.0 / classes.size()) : classes;
+    map.classes = with_prior(classes, calibrated ? 1.0 / classes.size() : 1);
     IntegrationConfig config;
     if (calibrated) config.labels.likelihood = &likelihood;
     IntegrationScratch scratch;

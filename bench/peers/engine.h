@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,10 @@ public:
   /// Converts a frame into the engine's own types, untimed.
   virtual void prepare(const Frame& frame) = 0;
   virtual std::vector<Eigen::Vector3f> surface() = 0;
+  /// Bytes of the distances and weights that the map holds, by its own count; none where it does not tell.
+  virtual std::optional<double> map_bytes() const = 0;
+  /// Blocks (8^3 voxels) that one frame updates on average: feltmap's only, for the machine's bound.
+  virtual double blocks_per_frame() const { return 0; }
 };
 
 struct Settings {
@@ -26,9 +31,14 @@ struct Settings {
   double max_depth_m = 4;
 };
 
+std::unique_ptr<Engine> feltmap_engine(const Settings& settings);
 std::unique_ptr<Engine> open3d_voxel_block_grid(const Settings& settings, int block_resolution);
 std::unique_ptr<Engine> open3d_scalable_volume(const Settings& settings);
 std::unique_ptr<Engine> opencv_hash_tsdf(const Settings& settings);
+
+constexpr int kEngines = 5;
+/// Number 0: feltmap; then VoxelBlockGrid of 8^3 and 16^3, ScalableTSDFVolume, HASHTSDF.
+std::unique_ptr<Engine> engine(int number, const Settings& settings);
 
 /// Limits the threads of each library's own pool.
 void open3d_threads(int threads);

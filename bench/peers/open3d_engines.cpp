@@ -37,6 +37,10 @@ public:
     for (const auto& p : mesh.vertices_) out.push_back(p.cast<float>());
     return out;
   }
+  std::optional<double> map_bytes() const override {
+    // Blocks that it has taken, not those it has room for: that is chosen beforehand.
+    return double(grid_.GetHashMap().Size()) * resolution_ * resolution_ * resolution_ * 2 * sizeof(float);
+  }
 
 private:
   Settings settings_;
@@ -70,6 +74,12 @@ public:
     std::vector<Eigen::Vector3f> out;
     for (const auto& p : volume_.ExtractPointCloud()->points_) out.push_back(p.cast<float>());
     return out;
+  }
+  std::optional<double> map_bytes() const override {
+    double bytes = 0;
+    for (const auto& [index, unit] : volume_.volume_units_)
+      if (unit.volume_) bytes += double(unit.volume_->voxels_.size() * sizeof(unit.volume_->voxels_[0]));
+    return bytes;
   }
 
 private:

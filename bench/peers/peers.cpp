@@ -13,9 +13,7 @@
 #include "core/simd.h"
 #include "io/mesh_io.h"
 #include "io/simulation/render_sequence.h"
-#include "mapping/marching_cubes.h"
 #include "mapping/mesh_distance.h"
-#include "mapping/tsdf_integrator.h"
 
 namespace {
 
@@ -23,33 +21,9 @@ using namespace felt;
 using bench::Engine;
 using bench::Settings;
 
-class Feltmap final : public Engine {
-public:
-  explicit Feltmap(const Settings& s) : map_(s.voxel_size_m, s.truncation_m) {
-    config_.max_depth_m = float(s.max_depth_m);
-  }
-  std::string name() const override { return "feltmap"; }
-  void prepare(const Frame& frame) override {
-    frames_.push_back(frame);
-    frames_.back().color = {};
-  }
-  void integrate(size_t n) override { felt::integrate(map_, frames_[n], config_, scratch_); }
-  std::vector<Eigen::Vector3f> surface() override { return extract_mesh(map_).positions; }
-
-private:
-  Map map_;
-  IntegrationConfig config_;
-  IntegrationScratch scratch_;
-  std::vector<Frame> frames_;
-};
-
 std::vector<std::unique_ptr<Engine>> engines(const Settings& settings) {
   std::vector<std::unique_ptr<Engine>> all;
-  all.push_back(std::make_unique<Feltmap>(settings));
-  all.push_back(bench::open3d_voxel_block_grid(settings, 8));
-  all.push_back(bench::open3d_voxel_block_grid(settings, 16));
-  all.push_back(bench::open3d_scalable_volume(settings));
-  all.push_back(bench::opencv_hash_tsdf(settings));
+  for (int e = 0; e < bench::kEngines; ++e) all.push_back(bench::engine(e, settings));
   return all;
 }
 

@@ -3,10 +3,8 @@
 //   bench_fusion [sequence]
 #include <tbb/global_control.h>
 
-#include <cstring>
-#include <numeric>
-
 #include "bench/support/bench.h"
+#include "bench/support/bound.h"
 #include "core/simd.h"
 #include "mapping/tsdf_integrator.h"
 #include "mapping/vdb_state.h"
@@ -83,35 +81,6 @@ void compare_distances(const std::vector<Frame>& frames) {
                 bench::median(best[model]) / axis);
 }
 
-/// Least time for the memory traffic of one frame: every depth pixel once, tsdf and weight of each block in view read
-/// and written once, one scattered read of depth a voxel.
-double bound_ms(const std::vector<Frame>& frames, double blocks_per_frame) {
-  std::vector<float> stream(64 << 20 >> 2, 1.0f), target(stream.size());
-  double copy = 1e9, gather = 1e9;
-  for (int repetition = 0; repetition < 5; ++repetition)
-    copy = std::min(copy, bench::seconds([&] { std::memcpy(target.data(), stream.data(), stream.size() * 4); }));
-  const double bytes_per_s = 2.0 * double(stream.size()) * 4 / copy;
-  std::vector<uint32_t> pixel(1 << 16);
-  const DepthImage& depth = frames[frames.size() / 2].depth_m;
-  for (size_t i = 0; i < pixel.size(); ++i)  // the pattern of one block after another: 64 rows of nearby pixels
-    pixel[i] = uint32_t(((i / 64 % 440) * size_t(depth.width()) + i % 8 * 5 + i / 8 % 8 * 5 * size_t(depth.width())) %
-                        depth.size());
-  float sum = 0;
-  for (int repetition = 0; repetition < 20; ++repetition)
-    gather = std::min(gather, bench::seconds([&] {
-                        float s[4] = {};
-                        for (size_t i = 0; i < pixel.size(); i += 4)
-                          for (size_t j = 0; j < 4; ++j) s[j] += depth.data()[pixel[i + j]];
-                        sum += s[0] + s[1] + s[2] + s[3];
-                      }));
-  const double reads_per_s = double(pixel.size()) / gather;
-  const double voxels = blocks_per_frame * kBlockVoxels;
-  const double bytes = double(depth.size()) * 4 + voxels * 2 * 4 * 2;
-  std::printf("bound: %.1f GB/s copied, %.2f G scattered reads/s (%g)\n", bytes_per_s * 1e-9, reads_per_s * 1e-9,
-              sum > 0 ? 1.0 : 0.0);
-  return 1e3 * std::max(bytes / bytes_per_s, voxels / reads_per_s);
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -137,7 +106,11 @@ int main(int argc, char** argv) {
                     c.last_third_ms, c.blocks_per_frame, c.total_ms * 1e6 / (c.blocks_per_frame * kBlockVoxels),
                     c.blocks, c.bytes_per_voxel, c.stock_bytes_per_voxel);
       }
-  const double bound = bound_ms(frames, blocks_at_2cm);
+  const DepthImage& depth = frames[frames.size() / 2].depth_m;
+  const bench::MachineLimits limits = bench::machine_limits(depth);
+  std::printf("bound: %.1f GB/s copied, %.2f G scattered reads/s\n", limits.copied_bytes_per_s * 1e-9,
+              limits.scattered_reads_per_s * 1e-9);
+  const double bound = bench::bound_ms(limits, depth, blocks_at_2cm);
   std::printf("2 cm, depth only: %.3f ms a frame, bound %.3f ms: %.1f times the bound; two threads %.2f times one\n",
               one_thread, bound, one_thread / bound, one_thread / two_threads);
   compare_distances(frames);

@@ -164,10 +164,14 @@ std::vector<Settings> all_settings(double k, bool confusion_too) {
     double prior;
     bool confusion;
   };
-  std::vector<Counting> countings = {{"prior 1", 1, false}, {"prior 0.1", 0.1, false}, {"prior 1/k", 1 / k, false}};
+  std::vector<Counting> countings = {{"prior 1", 1, false},
+                                     {"prior 8/k", 8 / k, false},
+                                     {"prior 4/k", 4 / k, false},
+                                     {"prior 2/k", 2 / k, false},
+                                     {"prior 1/k", 1 / k, false}};
   if (confusion_too) {
     countings.push_back({"confusion matrix, prior 1", 1, true});
-    countings.push_back({"confusion matrix, prior 0.1", 0.1, true});
+    countings.push_back({"confusion matrix, prior 8/k", 8 / k, true});
     countings.push_back({"confusion matrix, prior 1/k", 1 / k, true});
   }
   std::vector<Settings> all;

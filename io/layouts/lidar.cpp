@@ -61,12 +61,12 @@ SequenceListing list(const fs::path& path, const SequenceOptions&) {
     poses = read_trajectory(file, false);
     const Eigen::Matrix4d Tr = sensor_to_camera(folder);
     for (StampedPose& pose : poses) pose.matrix = pose.matrix * Tr;
-  } else if (scans.size() == 1) {
-    poses.push_back({0, Eigen::Matrix4d::Identity(), 0});
-    listing.notes.push_back("a single scan without a pose: the sensor is the origin, z up");
   } else {
-    throw FormatError(describe_mismatch(path.string(), "poses of " + std::to_string(scans.size()) + " scans",
-                                        "poses.txt, or the name of a single scan", "none"));
+    // How the others lie to it nobody knows: they are skipped, and counted, for want of a pose.
+    poses.push_back({0, Eigen::Matrix4d::Identity(), 0});
+    listing.notes.push_back(scans.size() == 1 ? "a single scan without a pose: the sensor is the origin, z up"
+                                              : "no poses.txt: only the first of " + std::to_string(scans.size()) +
+                                                    " scans is used, the sensor is the origin, z up");
   }
   for (size_t i = 0; i < scans.size(); ++i)
     for (int face = 0; face < kScanFaces; ++face) {

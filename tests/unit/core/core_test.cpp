@@ -60,3 +60,26 @@ TEST_CASE("a class table gives slots to classes that are not ignored and names e
     CHECK(std::string(e.what()).find("'ice'") != std::string::npos);
   }
 }
+
+TEST_CASE("classes without a prior of their own share eight counts where they are more than eight") {
+  const auto table_of = [](int k, std::optional<double> prior) {
+    std::vector<ClassInfo> rows{{0, "none", {}, true}};
+    for (int i = 1; i <= k; ++i) rows.push_back({uint16_t(i), "class " + std::to_string(i), {}, false, prior});
+    return ClassTable(rows);
+  };
+  CHECK(table_of(3, {}).prior(2) == 1);
+  CHECK(table_of(8, {}).prior(7) == 1);
+  CHECK(table_of(16, {}).prior(0) == 0.5);
+  CHECK(table_of(16, {}).prior_total() == 8);
+  CHECK(table_of(16, 2.0).prior(15) == 2);
+  // Given or by default: the same belief.
+  CHECK(table_of(16, {}) == table_of(16, 0.5));
+  CHECK_FALSE(table_of(16, {}) == table_of(16, 1.0));
+  std::vector<ClassInfo> rows = table_of(16, {}).classes();
+  rows[4].prior = 3;
+  const ClassTable mixed(rows);
+  CHECK_FALSE(mixed.even_prior());
+  CHECK(mixed.prior(3) == 3);
+  CHECK(mixed.prior(4) == 0.5);
+  CHECK_THROWS_AS(table_of(3, 0.0), ConfigError);
+}

@@ -42,6 +42,17 @@ TEST_CASE("a loaded map has the hash, the tables and the journals of the saved o
   }
 }
 
+TEST_CASE("a loaded map keeps the priors that its classes had by default") {
+  const test::TemporaryDirectory directory;
+  const Map map = test::random_map({.seed = 5, .blocks = 4, .classes = 20});
+  REQUIRE(map.classes.prior(0) == 0.4);
+  save_map(map, directory.path() / "map.vdb");
+  const Map loaded = load_map(directory.path() / "map.vdb");
+  CHECK(loaded.classes.at_slot(0).prior == 0.4);
+  CHECK(loaded.classes == map.classes);
+  CHECK(map_hash(loaded) == map_hash(map));
+}
+
 TEST_CASE("a loaded map has no plane that the saved one had not, and the other way round") {
   const test::TemporaryDirectory directory;
   Map map(0.02, 0.08);
