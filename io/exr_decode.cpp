@@ -102,7 +102,7 @@ public:
 private:
   struct Pipeline {
     exr_const_context_t context;
-    exr_decode_pipeline_t decode = EXR_DECODE_PIPELINE_INITIALIZER;
+    exr_decode_pipeline_t decode{};
     ~Pipeline() { exr_decoding_destroy(context, &decode); }
   };
 

@@ -17,7 +17,6 @@ struct Summary {
 };
 
 Summary summary_of(const std::vector<PairScore>& scores) {
-  Summary summary;
   std::vector<double> meets, residuals;
   for (const PairScore& score : scores) {
     if (score.in_view < 0.05) continue;
