@@ -24,8 +24,10 @@ struct FrameSegmentSettings {
 
 /// Working memory of `frame_segments`, reused from frame to frame: fresh memory costs more than the work.
 struct FrameSegmentScratch {
-  std::vector<float> depth, smooth, step, normal[3], spare;
-  std::vector<uint32_t> parent, size, wave, next;
+  std::vector<float> depth, smooth, step, normal[3], spare, spare_normal[3];
+  std::vector<uint32_t> run, parent, size;  ///< first pixels of runs joined along a row, their union-find; pieces
+  std::vector<uint32_t> piece, open, wave,
+      next;                                    ///< piece of each pixel; pixels of none, and those that grow into them
   std::vector<uint8_t> join_right, join_down;  ///< of one row
 };
 
