@@ -185,16 +185,17 @@ void print_summary(const ReconstructReport& report, const fs::path& folder) {
   for (const char* name : {kMapName, kMeshName, kReportName}) std::printf("  %s\n", (folder / name).c_str());
 }
 
-/// A few frames projected into each other before the work begins: what is likely wrong is said, and nothing changed.
-void warn_of_faults(const ReconstructOptions& options) {
+/// A few frames projected into each other before the work begins: what is likely wrong. Findings that call for a
+/// warning.
+std::vector<Finding> likely_faults(const fs::path& sequence, const SequenceOptions& reading) {
+  std::vector<Finding> faults;
   try {
-    for (const Finding& finding : examine_quickly(options.sequence, options.reading).findings)
-      if (finding.faulty)
-        spdlog::warn("{}: {} ({}); try {}, and see feltmap doctor", finding.topic, finding.belief, finding.evidence,
-                     finding.remedy);
+    for (Finding& finding : examine_quickly(sequence, reading).findings)
+      if (finding.faulty) faults.push_back(std::move(finding));
   } catch (const Error&) {
     // What cannot even be examined is reported where it is read.
   }
+  return faults;
 }
 
 int run(const ReconstructArguments& arguments, CommonOptions common) {
@@ -205,12 +206,18 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, size_t(common.thread_count()));
   auto sequence = open_sequence(options.sequence, options.reading);
   adopt_sequence_defaults(sequence->info(), options);
+  // Loading a network and looking at frames both take a moment, and one thread each.
+  auto faults = std::async(
+      common.thread_count() > 1 ? std::launch::async : std::launch::deferred,
+      [&sequence = options.sequence, &reading = options.reading] { return likely_faults(sequence, reading); });
   const Perception perception = perception_of(options.perception, sequence->info().classes);
   const PreparedClasses classes = prepare_classes(options.labels, perception.classes(sequence->info()));
   const TouchPlan touches = plan_touches(options, *sequence, classes.table);
   prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite || options.resume);
   check_memory(*sequence, options);
-  warn_of_faults(options);
+  for (const Finding& fault : faults.get())
+    spdlog::warn("{}: {} ({}); try {}, and see feltmap doctor", fault.topic, fault.belief, fault.evidence,
+                 fault.remedy);
   sequence = perceived_sequence(std::move(sequence), perception);
 
   const nlohmann::ordered_json config = to_json(options);
