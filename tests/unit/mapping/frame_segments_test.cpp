@@ -2,10 +2,13 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <map>
 
+#include "mapping/frame_segment_kernels.h"
 #include "mapping/segment_voting.h"
+#include "tests/support/simd_targets.h"
 #include "tests/support/views.h"
 
 namespace felt::test {
@@ -138,6 +141,89 @@ TEST_CASE("images of any size are cut", "[segments]") {
       for (const uint16_t s : segments) REQUIRE(s == 1);
     }
   CHECK(frame_segments({}, kCamera).empty());
+}
+
+TEST_CASE("every SIMD target gives the scalar version's bits for runs of every length", "[segments]") {
+  constexpr int kAcross = 90, kRows = 16, kMiddle = 8, kReach = 3;
+  constexpr size_t kPixels = size_t(kAcross) * kRows;
+  Random random(12);
+  std::vector<float> depth(kPixels), step(kPixels), normal[3];
+  std::vector<Rgba8> color(kPixels);
+  for (auto& plane : normal) plane.resize(kPixels);
+  for (size_t p = 0; p < kPixels; ++p) {
+    const bool measured = random() > 0.15;
+    depth[p] = measured ? float(random.between(1.0, 1.03)) : 0.0f;
+    step[p] = measured ? 0.02f : -1.0f;
+    const Eigen::Vector3d n(random.between(-0.2, 0.2), random.between(-0.2, 0.2), 1);
+    for (int c = 0; c < 3; ++c) normal[c][p] = float(n.normalized()[c]);
+    color[p] = {uint8_t(90 + 40 * random()), uint8_t(90 + 40 * random()), uint8_t(255 * random()), 255};
+  }
+  const size_t row = size_t(kAcross) * kMiddle;
+  const DepthRow here{&depth[row], &step[row]};
+  const float* const normals[3] = {&normal[0][row], &normal[1][row], &normal[2][row]};
+  const SurfaceRow surface{here, {normals[0], normals[1], normals[2]}, 1 / 150.0f, 1 / 140.0f, 44, 7, 0.97f, 0.2f};
+  NormalView view{150, 140, 44, 7, kAcross, kReach, true, true, true, true};
+
+  // All that the kernels make of one run, one after the other.
+  const auto results = [&](int first, int end, bool scalar) {
+    std::vector<float> out(9 * kAcross, -7);
+    std::vector<uint8_t> joined(4 * kAcross, 1);
+    float *const a = out.data(), *const b = a + kAcross, *const c = a + 2 * kAcross;
+    for (const std::ptrdiff_t stride : {std::ptrdiff_t(1), std::ptrdiff_t(kAcross)}) {
+      const bool rows = stride == 1;
+      float* const plane = rows ? a : b;
+      (scalar ? smooth_row_scalar : smooth_row)(here, stride, 2, first, end, here.depth, plane);
+      float* const means[3] = {c + (rows ? 0 : 3) * kAcross, c + (rows ? 1 : 4) * kAcross,
+                               c + (rows ? 2 : 5) * kAcross};
+      (scalar ? smooth_normal_row_scalar : smooth_normal_row)(here, stride, 2, first, end, normals, means, rows);
+      uint8_t* const pairs = joined.data() + (rows ? 0 : kAcross);
+      (scalar ? join_row_scalar : join_row)(surface, kMiddle, stride, first, end, pairs);
+      (scalar ? part_row_by_normals_scalar : part_row_by_normals)(surface, stride, kReach, first, end, pairs);
+      (scalar ? part_row_by_color_scalar : part_row_by_color)(&color[row], stride, 9 * 150 * 150, first, end,
+                                                              joined.data() + (rows ? 2 : 3) * kAcross);
+    }
+    // The sides in turn, so that none is used that the image has not.
+    std::vector<float> slopes;
+    for (int without = 0; without < 5; ++without) {
+      view.left = without != 1, view.right = without != 2, view.up = without != 3, view.down = without != 4;
+      std::vector<float> made(3 * kAcross, -7);
+      float* const to[3] = {made.data(), made.data() + kAcross, made.data() + 2 * kAcross};
+      (scalar ? normal_row_scalar : normal_row)(view, here, kMiddle, first, end, to);
+      slopes.insert(slopes.end(), made.begin(), made.end());
+    }
+    out.insert(out.end(), slopes.begin(), slopes.end());
+    return std::pair(out, joined);
+  };
+  size_t parted = 0, kept = 0;
+  for (int first = 4; first < 8; ++first)
+    for (int end = first + 1; end <= kAcross - 5; end += end < 45 ? 1 : 13) {
+      const auto expected = results(first, end, true);
+      for (const uint8_t j : expected.second) ++(j != 0 ? kept : parted);
+      on_every_simd_target([&](const std::string& name) {
+        INFO(name << ", pixels " << first << " to " << end);
+        const auto found = results(first, end, false);
+        REQUIRE(std::memcmp(found.first.data(), expected.first.data(), sizeof(float) * found.first.size()) == 0);
+        REQUIRE(found.second == expected.second);
+      });
+    }
+  CHECK(parted > 1000);
+  CHECK(kept > 1000);
+}
+
+TEST_CASE("every SIMD target cuts the same segments", "[segments]") {
+  Random random(5);
+  Frame frame = ball_before_wall(Eigen::Isometry3d::Identity(), 163, 121);
+  for (float& d : frame.depth_m) d = random() < 0.05 ? 0.0f : d + float(random.between(-0.002, 0.002));
+  FrameSegmentSettings settings;
+  settings.min_pixels = 20;
+  Image<uint16_t> first;
+  on_every_simd_target([&](const std::string& name) {
+    INFO(name);
+    const Image<uint16_t> segments = frame_segments(frame.depth_m, frame.camera, frame.color, settings);
+    if (first.empty()) first = segments;
+    CHECK(segments == first);
+  });
+  CHECK(sizes(first).size() > 2);
 }
 
 TEST_CASE("labels of a segment become what most of its pixels say, where enough of them do", "[segments]") {
