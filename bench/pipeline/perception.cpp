@@ -24,9 +24,10 @@
 namespace {
 namespace fs = std::filesystem;
 
-double network_alone_s(const felt::NetModel& model, const std::vector<felt::Planes>& inputs, int frames, int threads) {
-  std::vector<std::unique_ptr<felt::Network>> networks;
-  for (int i = 0; i < threads; ++i) networks.push_back(felt::open_network(model));
+using Networks = std::vector<std::unique_ptr<felt::Network>>;
+
+/// A thread for each network.
+double network_alone_s(const Networks& networks, const std::vector<felt::Planes>& inputs, int frames) {
   std::atomic<int> next = 0;
   return felt::bench::seconds([&] {
     std::vector<std::thread> workers;
@@ -83,7 +84,9 @@ int main(int argc, char** argv) {
   Times alone, whole;
   nlohmann::json report;
   for (int round = 0; round < rounds; ++round) {
-    alone.add(RUSAGE_SELF, [&] { return network_alone_s(model, inputs, frames, threads); });
+    Networks networks;
+    for (int i = 0; i < threads; ++i) networks.push_back(felt::open_network(model));
+    alone.add(RUSAGE_SELF, [&] { return network_alone_s(networks, inputs, frames); });
     int status = 0;
     whole.add(RUSAGE_CHILDREN, [&] { return felt::bench::seconds([&] { status = std::system(command.c_str()); }); });
     if (status != 0) return 1;
