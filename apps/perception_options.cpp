@@ -13,11 +13,12 @@ const std::map<std::string, SegmentSource> kSources = {
 }  // namespace
 
 void PerceptionArguments::add_to(CLI::App& command, const char* group, const char* net_option) {
-  command.add_option(net_option, net, "Segment the colour images with the network that this file describes (net.yaml)")
-      ->option_text("FILE")
-      ->group(group);
+  CLI::Option* const network = command.add_option(
+      net_option, net, "Segment the colour images with the network that this file describes (net.yaml)");
+  network->option_text("FILE")->group(group);
   command.add_option("--top", top, "Probabilities of a pixel's m likeliest classes instead of its label [0: label]")
       ->check(CLI::Range(0, 64))
+      ->needs(network)
       ->group(group);
   command
       .add_option(

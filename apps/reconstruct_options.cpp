@@ -175,6 +175,8 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   for (const std::string& problem : problems_of(options.labels)) problems.add(problem);
   fusion.labels = label_config(options.labels);
   reading.read_instances = fusion.labels.instances || a.perception.vote == SegmentSource::instances;
+  problems.expect(a.perception.instances.empty() || reading.read_instances, "--masks", "what they are for",
+                  "--vote instances or --instances", "neither");
   problems.throw_if_any();
   return options;
 }

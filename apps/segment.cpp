@@ -129,6 +129,8 @@ int run_segment(const SegmentOptions& options) {
   const auto start = Clock::now();
   if (!options.perception.asked())
     throw ConfigError(describe_mismatch("segment", "--net or --vote", "what makes or changes labels", "neither"));
+  if (!options.perception.instances.empty() && options.perception.vote != SegmentSource::instances)
+    throw ConfigError(describe_mismatch("segment", "--masks", "--vote instances, which they are for", "without it"));
   SequenceOptions reading;
   reading.format = options.format;
   reading.classes_file = options.classes;

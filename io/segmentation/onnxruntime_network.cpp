@@ -4,6 +4,7 @@
 #ifdef FELTMAP_HAVE_ONNXRUNTIME
 #include <onnxruntime_cxx_api.h>
 
+#include <algorithm>
 #include <array>
 
 namespace felt {

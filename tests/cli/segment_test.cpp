@@ -124,6 +124,22 @@ TEST_CASE("a map does not depend on the number of threads that run the network")
   }
 }
 
+TEST_CASE("options that would do nothing are refused") {
+  const Setting setting;
+  const auto refused = [&](const std::string& more, const std::string& expected) {
+    const CommandResult result = run_feltmap(more + " --out " + quoted(setting.out));
+    INFO(more << ": " << result.err);
+    CHECK(result.exit_code != 0);
+    CHECK(result.err.find(expected) != std::string::npos);
+    CHECK_FALSE(fs::exists(setting.out));
+  };
+  const std::string scene = quoted(setting.sequence);
+  refused("reconstruct " + scene + " --top 3", "--top requires --segmenter");
+  refused("segment " + scene + " --vote geometric --top 3", "--top requires --net");
+  refused("reconstruct " + scene + " --vote geometric --masks " + quoted(setting.folder.path()), "--masks");
+  refused("segment " + scene + " --vote geometric --masks " + quoted(setting.folder.path()), "--masks");
+}
+
 TEST_CASE("a network that cannot be used ends segment and reconstruct with one line and no output") {
   const Setting setting;
   const auto fails = [&](int code, const std::string& said) {
