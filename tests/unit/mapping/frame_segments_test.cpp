@@ -156,7 +156,9 @@ TEST_CASE("every SIMD target gives the scalar version's bits for runs of every l
     step[p] = measured ? 0.02f : -1.0f;
     const Eigen::Vector3d n(random.between(-0.2, 0.2), random.between(-0.2, 0.2), 1);
     for (int c = 0; c < 3; ++c) normal[c][p] = float(n.normalized()[c]);
-    color[p] = {uint8_t(90 + 40 * random()), uint8_t(90 + 40 * random()), uint8_t(255 * random()), 255};
+    // Few values, so that differences of exactly the limit are among them.
+    const auto level = [&] { return uint8_t(90 + 10 * int(5 * random())); };
+    color[p] = {level(), level(), level(), uint8_t(255 * random())};
   }
   const size_t row = size_t(kAcross) * kMiddle;
   const DepthRow here{&depth[row], &step[row]};
@@ -179,7 +181,7 @@ TEST_CASE("every SIMD target gives the scalar version's bits for runs of every l
       uint8_t* const pairs = joined.data() + (rows ? 0 : kAcross);
       (scalar ? join_row_scalar : join_row)(surface, kMiddle, stride, first, end, pairs);
       (scalar ? part_row_by_normals_scalar : part_row_by_normals)(surface, stride, kReach, first, end, pairs);
-      (scalar ? part_row_by_color_scalar : part_row_by_color)(&color[row], stride, 9 * 150 * 150, first, end,
+      (scalar ? part_row_by_color_scalar : part_row_by_color)(&color[row], stride, 1800, first, end,
                                                               joined.data() + (rows ? 2 : 3) * kAcross);
     }
     // The sides in turn, so that none is used that the image has not.
