@@ -55,8 +55,8 @@ private:
   struct State {
     uint32_t block;  ///< store number
     bool examined = false, queued = false;
-    std::array<uint32_t, 27> near;  ///< store numbers of the block's neighbours once it was examined
-    BlockMask pending;              ///< bits that reached the block since its last visit
+    std::array<uint32_t, 27> near;   ///< store numbers of the block's neighbours once it was examined
+    BlockMask pending;               ///< bits that reached the block since its last visit
     BlockMask reached, grown, open;  ///< candidates that were reached; grown through; the candidates that were not
     BlockMask region;
     BlockSurface surface;
@@ -155,7 +155,8 @@ private:
     for (const uint32_t n : grown)
       for (size_t i = 0; i < 27; ++i)
         if (const uint32_t block = state_[n].near[i]; block != BlockStore::kNone && number_[block] == kUnknown)
-          if (lies_near(state_[n].grown, int(i))) state_of(block).surface.candidate = candidates(map_.store[block], rule_);
+          if (lies_near(state_[n].grown, int(i)))
+            state_of(block).surface.candidate = candidates(map_.store[block], rule_);
     for (State& state : state_) state.open = state.surface.candidate - state.grown;
     std::vector<std::vector<std::pair<uint32_t, BlockMask>>> joined(grown.size());
     const auto end = [&](size_t g) {
@@ -186,8 +187,11 @@ private:
 
   /// Whether a bit of the mask lies within kCollar voxels of the neighbour block at offset i (as in BlockNeighbours).
   static bool lies_near(const BlockMask& mask, int i) {
-    const auto end = [](int step, uint64_t low, uint64_t high) { return step < 0 ? low : step > 0 ? high : ~uint64_t(0); };
-    constexpr uint64_t kLowZ = 0x0303030303030303, kHighZ = 0xc0c0c0c0c0c0c0c0, kLowY = 0xffff, kHighY = 0xffff000000000000;
+    const auto end = [](int step, uint64_t low, uint64_t high) {
+      return step < 0 ? low : step > 0 ? high : ~uint64_t(0);
+    };
+    constexpr uint64_t kLowZ = 0x0303030303030303, kHighZ = 0xc0c0c0c0c0c0c0c0, kLowY = 0xffff,
+                       kHighY = 0xffff000000000000;
     static_assert(kCollar == 2);
     const int dx = i / 9 - 1;
     const uint64_t side = end(i / 3 % 3 - 1, kLowY, kHighY) & end(i % 3 - 1, kLowZ, kHighZ);

@@ -156,8 +156,8 @@ std::array<BlockMask, 27> on_planes_of(const BlockNeighbours& near, const BlockM
       const auto bits = [&](const BlockMask* mask) {
         return mask == nullptr ? 0u : unsigned(mask->word[size_t(x & 7)] >> (8 * (y & 7)) & 0xff);
       };
-      const unsigned all = bits(column[0]) >> (8 - kCollar) | bits(column[1]) << kCollar |
-                           bits(column[2]) << (8 + kCollar);
+      const unsigned all =
+          bits(column[0]) >> (8 - kCollar) | bits(column[1]) << kCollar | bits(column[2]) << (8 + kCollar);
       row[x + kCollar][y + kCollar] = uint16_t(all & ((1u << kSide) - 1));
       any |= row[x + kCollar][y + kCollar];
     }

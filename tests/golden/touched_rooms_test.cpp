@@ -322,14 +322,13 @@ void check_regions(const std::string& name, const Scene& scene, const std::vecto
             same_m = std::min(same_m, std::abs(signed_distance_m(primitive, p)));
         const double off_m = is_flat ? std::abs(normal.dot(p - simulated.position_m)) : 0;
         // Faces lie at multiples of a centimetre: just two voxels off must not depend on rounding.
-        const double allowed_m =
-            2.001 * voxel + (exact_depth ? 0 : half_depth_step_m(p, trajectory, camera));
+        const double allowed_m = 2.001 * voxel + (exact_depth ? 0 : half_depth_step_m(p, trajectory, camera));
         other_material += same_m > allowed_m;
         beyond_crease += off_m > allowed_m;
         farthest_m = std::max({farthest_m, same_m - allowed_m, off_m - allowed_m});
       });
-    INFO(name << ", " << felt_thing.name << " at " << simulated.position_m.transpose() << ": "
-              << touch.region.voxels() << " voxels, " << other_material << " beside the material, " << beyond_crease
+    INFO(name << ", " << felt_thing.name << " at " << simulated.position_m.transpose() << ": " << touch.region.voxels()
+              << " voxels, " << other_material << " beside the material, " << beyond_crease
               << " off the plane, farthest " << farthest_m / voxel << " voxels more than allowed");
     CHECK(other_material == 0);
     CHECK(beyond_crease == 0);
