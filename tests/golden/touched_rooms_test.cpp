@@ -75,7 +75,7 @@ int exact_decision(const Map& map, const Region& region, const Property& frictio
   for (size_t b = 0; b < region.blocks(); ++b) {
     const Block& block = *map.store.get(region.coord[b]);
     for_each_bit(region.mask[b], [&](int i) {
-      for (double& s : score) s += 1;
+      for (int c = 0; c < k; ++c) score[size_t(c)] += map.classes.prior(c);
       for (const EvidencePlane& e : block.evidence) score[e.slot] += double(e.counts->value[i]);
     });
   }
@@ -110,8 +110,8 @@ TEST_CASE("touched things of simulated rooms are decided as exactly, the rest of
       Frame frame = render_frame(scene, camera, trajectory[i], int64_t(i), options);
       frame.labels =
           run_network(network, scene.materials, frame.labels, frame.instances, uint64_t(room), frame.index).labels;
-      // The network is right in 78 of 100 cases, and says so however often it looks: (1 + n) / (k + n) = 0.78.
-      fuse(map, frame, float((0.78 * map.classes.size() - 1) / 0.22));
+      // The network is right in 78 of 100 cases, and says so however often it looks: (a + n) / (k a + n) = 0.78.
+      fuse(map, frame, float((0.78 * map.classes.size() - 1) / 0.22 * map.classes.prior(0)));
     }
     const std::string hash = map_hash(map);
     TouchOptions touch_options;
