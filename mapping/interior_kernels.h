@@ -28,9 +28,24 @@ struct SurfaceNormal {
   float x = 0, y = 0, z = 0;
 };
 
-/// Direction in which the signed distance grows fastest around an observed voxel of the tile (-1 .. 8): the plane that
-/// fits the 27 voxels around it best, which halves to thirds the noise of central differences. Where some of them were
-/// never observed, the mean of what slopes there are along each axis. Zero where there is none.
+/// Signed distance around a voxel as a linear function, metres and metres a voxel. Along rays that graze the surface it
+/// grows by more than a voxel's size a voxel.
+struct SurfacePlane {
+  float value = 0, x = 0, y = 0, z = 0;
+};
+
+/// The plane that fits the 27 voxels around a voxel of the tile (-1 .. 8) best; NaN where some of them were never
+/// observed.
+SurfacePlane fitted_plane(const SurfaceTile& tile, int at) noexcept;
+
+/// Whether the surface near a voxel at (dx, dy, dz) voxels from the plane's, with signed distance `tsdf_m`, lies within
+/// `share` voxels of the plane, measured along its normal: |tsdf - plane| <= share * max(voxel, slope). Never where
+/// either is NaN, nor where the distance grows by less than half a voxel a voxel: there it is no surface's.
+bool lies_on(const SurfacePlane& plane, int dx, int dy, int dz, float tsdf_m, float voxel_m, float share) noexcept;
+
+/// Direction in which that plane's distance grows fastest, which halves to thirds the noise of central differences.
+/// Where some of the 27 were never observed, the mean of what slopes there are along each axis. Zero where there is
+/// none.
 SurfaceNormal smoothed_normal(const SurfaceTile& tile, int at) noexcept;
 
 /// The voxels of `candidate` (voxels of the band, |tsdf| <= band_m) whose neighbours in the band, of 26, all have

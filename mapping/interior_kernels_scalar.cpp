@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -37,6 +38,23 @@ float mean_slope(const float* t, int axis) {
   return count > 0 ? sum / float(count) : 0.0f;
 }
 
+/// Sums that 18 times the slopes of the fitted plane are (27 times its value); not a number where any of the 26
+/// neighbours is.
+SurfacePlane slope_sums(const float* t) {
+  constexpr int kX = SurfaceTile::kStepX, kY = SurfaceTile::kStepY;
+  const auto sum_z = [&](int row) { return (t[row - 1] + t[row]) + t[row + 1]; };
+  const auto plate = [&](int centre, int aside) {
+    return (sum_z(centre - aside) + sum_z(centre)) + sum_z(centre + aside);
+  };
+  const auto slopes_z = [&](int row) {
+    const auto rise = [&](int r) { return t[r + 1] - t[r - 1]; };
+    return (rise(row - kY) + rise(row)) + rise(row + kY);
+  };
+  const float low = plate(-kX, kY), high = plate(kX, kY);
+  return {(low + plate(0, kY)) + high, high - low, plate(kY, kX) - plate(-kY, kX),
+          (slopes_z(-kX) + slopes_z(0)) + slopes_z(kX)};
+}
+
 }  // namespace
 
 std::array<uint16_t, SurfaceTile::kSide> rows_near(const std::array<uint64_t, 8>& words, int reach) {
@@ -54,21 +72,22 @@ std::array<uint16_t, SurfaceTile::kSide> rows_near(const std::array<uint64_t, 8>
   return rows;
 }
 
+SurfacePlane fitted_plane(const SurfaceTile& tile, int at) noexcept {
+  const SurfacePlane sums = slope_sums(tile.tsdf + at);
+  return {sums.value / 27, sums.x / 18, sums.y / 18, sums.z / 18};
+}
+
+bool lies_on(const SurfacePlane& plane, int dx, int dy, int dz, float tsdf_m, float voxel_m, float share) noexcept {
+  const float off = tsdf_m - (plane.value + ((plane.x * float(dx) + plane.y * float(dy)) + plane.z * float(dz)));
+  const float slope2 = (plane.x * plane.x + plane.y * plane.y) + plane.z * plane.z;
+  const float voxel2 = voxel_m * voxel_m;
+  return slope2 >= 0.25f * voxel2 && off * off <= share * share * std::max(voxel2, slope2);
+}
+
 SurfaceNormal smoothed_normal(const SurfaceTile& tile, int at) noexcept {
-  constexpr int kX = SurfaceTile::kStepX, kY = SurfaceTile::kStepY;
   const float* t = tile.tsdf + at;
-  const auto sum_z = [&](int row) { return (t[row - 1] + t[row]) + t[row + 1]; };
-  const auto plate = [&](int centre, int aside) {
-    return (sum_z(centre - aside) + sum_z(centre)) + sum_z(centre + aside);
-  };
-  const auto slopes_z = [&](int row) {
-    const auto rise = [&](int r) { return t[r + 1] - t[r - 1]; };
-    return (rise(row - kY) + rise(row)) + rise(row + kY);
-  };
-  const float x = plate(kX, kY) - plate(-kX, kY), y = plate(kY, kX) - plate(-kY, kX),
-              z = (slopes_z(-kX) + slopes_z(0)) + slopes_z(kX);
-  // Not a number where any of the 26 neighbours is.
-  if (!std::isnan((x + y) + z)) return normalized(x, y, z);
+  const SurfacePlane sums = slope_sums(t);
+  if (!std::isnan((sums.x + sums.y) + sums.z)) return normalized(sums.x, sums.y, sums.z);
   return normalized(mean_slope(t, 0), mean_slope(t, 1), mean_slope(t, 2));
 }
 

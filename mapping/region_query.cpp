@@ -28,6 +28,7 @@ SurfaceRule band_rule(const Map& map, const RegionSettings& settings) {
   SurfaceRule rule;
   rule.band_m = float(settings.band_voxels * map.voxel_size_m);
   rule.min_weight = float(settings.min_weight);
+  rule.voxel_m = float(map.voxel_size_m);
   return rule;
 }
 
@@ -45,20 +46,19 @@ public:
       current.swap(wave_);
       for (const uint32_t n : current) visit(n);
     }
+    end_on_planes();
     return collect();
   }
-
-  /// Where the region may grow through, of a block of the region.
-  const BlockMask& grown(const BlockCoord& block) const { return state_[number_[map_.store.find(block)]].grown; }
 
 private:
   static constexpr uint32_t kUnknown = 0xffffffff;
   struct State {
     uint32_t block;  ///< store number
     bool examined = false, queued = false;
-    std::array<uint32_t, 27> near;  ///< store numbers of the block's neighbours once it was examined
-    BlockMask pending;              ///< bits that reached the block since its last visit
-    BlockMask region, grown;
+    std::array<uint32_t, 27> near;   ///< store numbers of the block's neighbours once it was examined
+    BlockMask pending;               ///< bits that reached the block since its last visit
+    BlockMask reached, grown, open;  ///< candidates that were reached; grown through; the candidates that were not
+    BlockMask region;
     BlockSurface surface;
   };
 
@@ -72,7 +72,7 @@ private:
 
   void reach(uint32_t block, const BlockMask& bits) {
     State& state = state_of(block);
-    const BlockMask fresh = bits - state.region;
+    const BlockMask fresh = bits - state.reached;
     // Once the block was examined, bits that are no candidates need no visit.
     if (!(state.examined ? fresh & state.surface.candidate : fresh).any()) return;
     state.pending |= fresh;
@@ -94,6 +94,7 @@ private:
           if (!(v == seed) && surface_normal(map_, v, rule_.min_weight).dot(normal) < rule_.cos_normal_change) continue;
           BlockMask bit;
           bit.set(offset_in_block(v));
+          state_of(block).region |= bit;
           reach(block, bit);
         }
   }
@@ -125,7 +126,7 @@ private:
   void visit(uint32_t n) {
     State& state = state_[n];
     state.queued = false;
-    state.region |= state.pending & state.surface.candidate;
+    state.reached |= state.pending & state.surface.candidate;
     BlockMask grown = (state.pending & state.surface.interior) - state.grown;
     state.pending = {};
     if (!grown.any()) return;
@@ -136,9 +137,67 @@ private:
     grown -= state.grown;
     state.grown |= grown;
     const std::array<BlockMask, 27> reached = dilated(grown);
-    state.region |= reached[13] & state.surface.candidate;
+    state.reached |= reached[13] & state.surface.candidate;
     for (size_t i = 0; i < reached.size(); ++i)
       if (i != 13 && state.near[i] != BlockStore::kNone && reached[i].any()) reach(state.near[i], reached[i]);
+  }
+
+  /// Adds what the region grew through and the candidates around that lie on its planes.
+  void end_on_planes() {
+    std::vector<uint32_t> grown;
+    for (uint32_t n = 0; n < state_.size(); ++n) {
+      State& state = state_[n];
+      state.region &= state.surface.candidate;  // the contact and what is beside it
+      state.region |= state.grown;
+      if (state.grown.any()) grown.push_back(n);
+    }
+    // Blocks that no voxel reached may hold some that end the region.
+    for (const uint32_t n : grown)
+      for (size_t i = 0; i < 27; ++i)
+        if (const uint32_t block = state_[n].near[i]; block != BlockStore::kNone && number_[block] == kUnknown)
+          if (lies_near(state_[n].grown, int(i)))
+            state_of(block).surface.candidate = candidates(map_.store[block], rule_);
+    for (State& state : state_) state.open = state.surface.candidate - state.grown;
+    std::vector<std::vector<std::pair<uint32_t, BlockMask>>> joined(grown.size());
+    const auto end = [&](size_t g) {
+      const State& state = state_[grown[g]];
+      BlockNeighbours near{};
+      std::array<const BlockMask*, 27> open{};
+      bool any = false;
+      for (size_t i = 0; i < 27; ++i) {
+        if (state.near[i] == BlockStore::kNone) continue;
+        near[i] = &map_.store[state.near[i]];
+        if (number_[state.near[i]] == kUnknown || !state_[number_[state.near[i]]].open.any()) continue;
+        open[i] = &state_[number_[state.near[i]]].open;
+        any = true;
+      }
+      if (!any) return;
+      const std::array<BlockMask, 27> found = on_planes_of(near, state.grown, open, rule_);
+      for (size_t i = 0; i < 27; ++i)
+        if (found[i].any()) joined[g].emplace_back(number_[state.near[i]], found[i]);
+    };
+    if (grown.size() < 16) {
+      for (size_t g = 0; g < grown.size(); ++g) end(g);
+    } else {
+      tbb::parallel_for(size_t(0), grown.size(), end);
+    }
+    for (const auto& some : joined)
+      for (const auto& [n, bits] : some) state_[n].region |= bits;
+  }
+
+  /// Whether a bit of the mask lies within kCollar voxels of the neighbour block at offset i (as in BlockNeighbours).
+  static bool lies_near(const BlockMask& mask, int i) {
+    const auto end = [](int step, uint64_t low, uint64_t high) {
+      return step < 0 ? low : step > 0 ? high : ~uint64_t(0);
+    };
+    constexpr uint64_t kLowZ = 0x0303030303030303, kHighZ = 0xc0c0c0c0c0c0c0c0, kLowY = 0xffff,
+                       kHighY = 0xffff000000000000;
+    static_assert(kCollar == 2);
+    const int dx = i / 9 - 1;
+    const uint64_t side = end(i / 3 % 3 - 1, kLowY, kHighY) & end(i % 3 - 1, kLowZ, kHighZ);
+    uint64_t any = 0;
+    for (int x = dx > 0 ? 6 : 0; x < (dx < 0 ? 2 : 8); ++x) any |= mask.word[size_t(x)];
+    return (any & side) != 0;
   }
 
   Region collect() const {
@@ -161,7 +220,7 @@ private:
 
 /// Keeps the voxels of a connected region within `radius_voxels` of the seed along the region (Dijkstra over
 /// 26-neighbours with steps 1, sqrt 2, sqrt 3; an overestimate of the geodesic by at most 8 %).
-Region within_geodesic(const Region& region, const Flood& flood, const Index3& seed, double radius_voxels) {
+Region within_geodesic(const Region& region, const Index3& seed, double radius_voxels) {
   struct Reach {
     float distance;
     Index3 voxel;
@@ -181,7 +240,6 @@ Region within_geodesic(const Region& region, const Flood& flood, const Index3& s
     const Reach r = queue.top();
     queue.pop();
     if (r.distance > *slot_of(r.voxel)) continue;
-    if (!(r.voxel == seed) && !flood.grown(block_of_voxel(r.voxel)).test(offset_in_block(r.voxel))) continue;
     for (int dx = -1; dx <= 1; ++dx)
       for (int dy = -1; dy <= 1; ++dy)
         for (int dz = -1; dz <= 1; ++dz) {
@@ -374,13 +432,12 @@ Region find_region(const Map& map, const Contact& contact, const RegionSettings&
   rule.class_ratio = float(settings.class_ratio);
   rule.cos_normal_change = float(std::cos(normal_limit_deg(map, contact, settings) * std::numbers::pi / 180));
   if (std::isfinite(settings.color_change)) limit_color(map, contact.voxel, settings.color_change, rule);
-  Flood flood(map, rule);
-  Region region = flood.run(contact.voxel);
+  Region region = Flood(map, rule).run(contact.voxel);
   if (region.empty())
     throw TouchError(
         "region: contact: expected a voxel that agrees with its own surroundings, found class noise there");
   if (std::isfinite(settings.radius_m) && region.contains(contact.voxel))
-    region = within_geodesic(region, flood, contact.voxel, settings.radius_m / map.voxel_size_m);
+    region = within_geodesic(region, contact.voxel, settings.radius_m / map.voxel_size_m);
   return region;
 }
 

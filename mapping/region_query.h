@@ -39,8 +39,9 @@ Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const Regio
 /// The voxels that a touch at `contact` speaks for, by rule:
 /// * `connected`: 26-connected from the contact over surface voxels that agree with its class (and colour, where
 ///   limited) and lie within the geodesic radius. The region grows only through *interior* voxels, whose neighbours in
-///   the band all have normals within `normal_change_deg` of theirs; their neighbours join and end it. So nothing on
-///   the far side of a crease can join, whatever the order of growth.
+///   the band all have normals within `normal_change_deg` of theirs, and ends with those voxels within kCollar of them
+///   that lie on their planes (mapping/region_surface.h). So it reaches a crease and not beyond, whatever the order of
+///   growth.
 /// * `sphere`: the surface band within radius_m of the contact.
 /// * `instance`: the surface band of the thing that the contact belongs to, wherever it is in the map.
 /// * `segment`: the contact's segment among those that the whole map is cut into (mapping/map_segments.h), as far as it

@@ -1,6 +1,7 @@
 #include "mapping/region_surface.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <numbers>
@@ -141,6 +142,70 @@ BlockNeighbours neighbours_of(const Map& map, const BlockCoord& c) {
   return near;
 }
 
+std::array<BlockMask, 27> on_planes_of(const BlockNeighbours& near, const BlockMask& grown,
+                                       const std::array<const BlockMask*, 27>& open, const SurfaceRule& rule) {
+  constexpr int kSide = 8 + 2 * kCollar;
+  static_assert(kCollar <= SurfaceTile::kHalo && kSide <= 16);
+  std::array<BlockMask, 27> joined{};
+  // Open voxels of rows along z: bit z + kCollar.
+  uint16_t row[kSide][kSide];
+  unsigned any = 0;
+  for (int x = -kCollar; x < 8 + kCollar; ++x)
+    for (int y = -kCollar; y < 8 + kCollar; ++y) {
+      const BlockMask* const* column = &open[size_t(9 * ((x >> 3) + 1) + 3 * ((y >> 3) + 1))];
+      const auto bits = [&](const BlockMask* mask) {
+        return mask == nullptr ? 0u : unsigned(mask->word[size_t(x & 7)] >> (8 * (y & 7)) & 0xff);
+      };
+      const unsigned all =
+          bits(column[0]) >> (8 - kCollar) | bits(column[1]) << kCollar | bits(column[2]) << (8 + kCollar);
+      row[x + kCollar][y + kCollar] = uint16_t(all & ((1u << kSide) - 1));
+      any |= row[x + kCollar][y + kCollar];
+    }
+  if (any == 0) return joined;
+  // Voxels that the region grows through with an open one in reach.
+  uint16_t along[kSide][8];
+  for (int x = 0; x < kSide; ++x)
+    for (int y = 0; y < 8; ++y) {
+      unsigned bits = 0;
+      for (int d = 0; d <= 2 * kCollar; ++d) bits |= row[x][y + d];
+      unsigned spread = 0;
+      for (int d = 0; d <= 2 * kCollar; ++d) spread |= bits >> d;
+      along[x][y] = uint16_t(spread & 0xff);
+    }
+  BlockMask reaching;
+  for (int x = 0; x < 8; ++x)
+    for (int y = 0; y < 8; ++y) {
+      unsigned bits = 0;
+      for (int d = 0; d <= 2 * kCollar; ++d) bits |= along[x + d][y];
+      reaching.word[size_t(x)] |= uint64_t(bits) << (8 * y);
+    }
+  reaching &= grown;
+  if (!reaching.any()) return joined;
+  SurfaceTile tile;
+  gather(near, reaching, rule.min_weight, tile);
+  for_each_bit(reaching, [&](int offset) {
+    const Index3 v = voxel_of_offset(offset);
+    constexpr unsigned kReach = (1u << (2 * kCollar + 1)) - 1;
+    SurfacePlane plane;
+    bool fitted = false;
+    for (int dx = -kCollar; dx <= kCollar; ++dx)
+      for (int dy = -kCollar; dy <= kCollar; ++dy) {
+        uint16_t& left = row[v.x + dx + kCollar][v.y + dy + kCollar];
+        for (unsigned bits = unsigned(left) >> v.z & kReach; bits != 0; bits &= bits - 1) {
+          const int dz = std::countr_zero(bits) - kCollar;
+          if (!fitted) plane = fitted_plane(tile, SurfaceTile::index(v.x, v.y, v.z)), fitted = true;
+          const Index3 u{v.x + dx, v.y + dy, v.z + dz};
+          if (!lies_on(plane, dx, dy, dz, tile.tsdf[SurfaceTile::index(u.x, u.y, u.z)], rule.voxel_m, kOffPlane))
+            continue;
+          left = uint16_t(left & ~(1u << (u.z + kCollar)));  // one plane is enough
+          joined[size_t(9 * ((u.x >> 3) + 1) + 3 * ((u.y >> 3) + 1) + (u.z >> 3) + 1)].set(
+              voxel_offset(u.x & 7, u.y & 7, u.z & 7));
+        }
+      }
+  });
+  return joined;
+}
+
 double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule& rule) {
   constexpr int kReach = 8;
   BlockMask everywhere;
@@ -181,13 +246,28 @@ double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule&
   return std::acos(std::clamp(double(*middle), -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
-Eigen::Vector3f surface_normal(const Map& map, const Index3& voxel, float min_weight) {
-  SurfaceTile tile;
+namespace {
+
+/// The 27 voxels around one, in a tile at its first voxel.
+void gather_around(const Map& map, const Index3& voxel, float min_weight, SurfaceTile& tile) {
   for (int n = 0; n < 27; ++n) {
     const Index3 d{n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1}, v{voxel.x + d.x, voxel.y + d.y, voxel.z + d.z};
     const Block* block = map.store.get(block_of_voxel(v));
     copy_observed(block, offset_in_block(v), 1, min_weight, &tile.tsdf[SurfaceTile::index(d.x, d.y, d.z)]);
   }
+}
+
+}  // namespace
+
+SurfacePlane surface_plane(const Map& map, const Index3& voxel, float min_weight) {
+  SurfaceTile tile;
+  gather_around(map, voxel, min_weight, tile);
+  return fitted_plane(tile, SurfaceTile::index(0, 0, 0));
+}
+
+Eigen::Vector3f surface_normal(const Map& map, const Index3& voxel, float min_weight) {
+  SurfaceTile tile;
+  gather_around(map, voxel, min_weight, tile);
   constexpr int kHere = SurfaceTile::index(0, 0, 0);
   if (std::isnan(tile.tsdf[kHere])) return Eigen::Vector3f::Zero();
   const SurfaceNormal n = smoothed_normal(tile, kHere);

@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 
+#include "mapping/interior_kernels.h"
 #include "mapping/map.h"
 #include "mapping/region.h"
 
@@ -20,6 +21,7 @@ struct SurfaceRule {
   float color[3] = {0, 0, 0};
   float color_change = 0;
   float cos_normal_change = -1;
+  float voxel_m = 0;
   Index3 centre;  ///< of the Euclidean limit
   float radius_voxels = std::numeric_limits<float>::infinity();
 };
@@ -43,9 +45,22 @@ using BlockNeighbours = std::array<const Block*, 27>;
 /// Reads the block and its neighbours; blocks may be examined in parallel.
 BlockSurface examine_block(const BlockNeighbours& near, const SurfaceRule& rule);
 
+/// How far, in voxels, the surface of a voxel that ends a region may lie off the plane of one that the region grows
+/// through, at most kCollar voxels from it (along each axis).
+constexpr float kOffPlane = 0.5f;
+constexpr int kCollar = 2;
+
+/// Of the voxels in `open` (by neighbour, null for none), those within kCollar voxels of a voxel of the block in
+/// `grown` whose plane they lie on: `lies_on` its `fitted_plane` (mapping/interior_kernels.h).
+std::array<BlockMask, 27> on_planes_of(const BlockNeighbours& near, const BlockMask& grown,
+                                       const std::array<const BlockMask*, 27>& open, const SurfaceRule& rule);
+
 /// How noisy the surface is around a voxel: the median angle, degrees, between the normals of face neighbours of the
 /// band within eight voxels of it (those ahead of every other voxel). 0 where there are none.
 double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule& rule);
+
+/// `fitted_plane` (mapping/interior_kernels.h) at a voxel.
+SurfacePlane surface_plane(const Map& map, const Index3& voxel, float min_weight);
 
 /// Unit normal of the surface at a voxel, towards free space: `smoothed_normal` (mapping/interior_kernels.h). Zero
 /// where there is none.

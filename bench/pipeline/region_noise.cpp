@@ -205,8 +205,10 @@ void rooms(const std::string& name, int frames, bool noisy) {
     for (size_t p = 0; p < places.size(); ++p) {
       const auto of_face = [&](int v) {
         const Index3& i = s.voxel[size_t(v)];
-        return height(p, v) <= 1.5 * kVoxel &&
-               std::abs(signed_distance_m(*things[p], Eigen::Vector3d(i.x, i.y, i.z) * kVoxel)) <= 1.5 * kVoxel;
+        const Eigen::Vector3d at = Eigen::Vector3d(i.x, i.y, i.z) * kVoxel;
+        // Voxels at the foot of a wall lie within the floor's band too, but are the wall's.
+        return height(p, v) <= 1.5 * kVoxel && std::abs(signed_distance_m(*things[p], at)) <= 1.5 * kVoxel &&
+               &scene.primitives[size_t(nearest_surface(scene, at).primitive)] == things[p];
       };
       faces.push_back(flooded(s, places[p].seed, of_face));
       for (size_t v = 0; v < s.voxel.size(); ++v) faces.back()[v] = faces.back()[v] && of_face(int(v));

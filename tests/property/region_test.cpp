@@ -85,21 +85,34 @@ std::set<Index3> flooded(const Map& map, const Contact& contact, const RegionSet
     for_each_neighbour(v, [&](const Index3& u) { all = all && (!in_band(u) || agree(v, u)); });
     return all;
   };
-  std::set<Index3> region, visited;
+  std::set<Index3> region, grown;
   std::vector<Index3> open;
   const auto reach = [&](const Index3& v) {
-    if (!is_candidate(v)) return;
-    region.insert(v);
-    if (!visited.contains(v) && is_interior(v)) visited.insert(v), open.push_back(v);
+    if (is_candidate(v) && !grown.contains(v) && is_interior(v)) grown.insert(v), open.push_back(v);
   };
-  reach(contact.voxel);
+  const auto plant = [&](const Index3& v) {
+    if (is_candidate(v)) region.insert(v);
+    reach(v);
+  };
+  plant(contact.voxel);
   for_each_neighbour(contact.voxel, [&](const Index3& u) {
-    if (agree(contact.voxel, u)) reach(u);
+    if (agree(contact.voxel, u)) plant(u);
   });
   while (!open.empty()) {
     const Index3 v = open.back();
     open.pop_back();
     for_each_neighbour(v, reach);
+  }
+  // What ends the region: candidates within two voxels on the plane of one that it grew through.
+  for (const Index3& v : grown) {
+    region.insert(v);
+    const SurfacePlane plane = surface_plane(map, v, min_weight);
+    for (int dx = -2; dx <= 2; ++dx)
+      for (int dy = -2; dy <= 2; ++dy)
+        for (int dz = -2; dz <= 2; ++dz)
+          if (const Index3 u{v.x + dx, v.y + dy, v.z + dz}; !region.contains(u) && is_candidate(u))
+            if (lies_on(plane, dx, dy, dz, voxel_at(map, u, min_weight)->tsdf, float(map.voxel_size_m), 0.5f))
+              region.insert(u);
   }
   return region;
 }
