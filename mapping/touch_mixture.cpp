@@ -68,7 +68,8 @@ void start_from_material(const Map& map, MixtureBlock& block, const std::vector<
       for (size_t c = 0; c < k; ++c) vision[c] = double(block.a[c * m + i]);
       const MaterialState& material = beliefs.material(touches);
       std::erase_if(touches, [&](uint32_t t) { return is_mixture(map.touches.touches[t]); });
-      const Belief belief = beliefs.assemble(vision, &material, touches);
+      Belief belief = beliefs.assemble(vision, &material, touches);
+      apply_concentration_floor(belief.concentration);
       for (size_t c = 0; c < k; ++c) {
         block.a[c * m + i] = float(belief.concentration[c]);
         for (MixtureBlock::Blocks& state : block.properties) {

@@ -86,6 +86,11 @@ std::vector<double> pooled_belief(const Map& map, const Region& region) {
   return belief;
 }
 
+void apply_concentration_floor(std::span<double> concentration) {
+  const double total = std::accumulate(concentration.begin(), concentration.end(), 0.0);
+  for (double& a : concentration) a = std::max(a, kBeliefFloor * total);
+}
+
 std::vector<uint32_t> covering_touches(const Map& map, const Index3& voxel) {
   std::vector<uint32_t> touches;
   for (uint32_t t = 0; t < map.touches.touches.size(); ++t)
@@ -160,9 +165,11 @@ Belief Beliefs::assemble(std::vector<double> vision, const MaterialState* materi
       belief.concentration[c] = std::max(kLeast, material->classes.p[c] * total);
   }
   std::vector<bool> mixed(properties, false);
+  bool first = true;
   for (const uint32_t t : touches) {
     const TouchRequest& r = map_.touches.touches[t].request;
     if (r.model != TouchModel::mixture) continue;
+    if (std::exchange(first, false) && material != nullptr) apply_concentration_floor(belief.concentration);
     const size_t p = size_t(*map_.properties.index_of(r.property));
     const MixtureUpdate update = mixture_update(belief.concentration, belief.nig[p], r.value, r.sigma, r.projection);
     mixed[p] = true;

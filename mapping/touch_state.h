@@ -17,7 +17,7 @@ namespace felt {
 /// Priors of a property by slot; a class without a prior has none (kappa 0).
 std::vector<Nig> nig_priors(const Property& property, const ClassTable& classes);
 
-/// Sum over the region of the Dirichlet concentrations (prior 1 a class, plus counts), over its total, with no class
+/// Sum over the region of the Dirichlet concentrations (priors plus counts), over its total, with no class
 /// below 1e-6. One sum a block, then blocks in canonical order: the same for any number of threads.
 std::vector<double> pooled_belief(const Map& map, const Region& region);
 
@@ -44,6 +44,11 @@ struct MaterialState {
 
 /// No class of a pooled belief is below this.
 constexpr double kBeliefFloor = 1e-6;
+
+/// What `mixture` readings start from where `material` readings came first: no class below kBeliefFloor of the total.
+/// One that the property says nothing of, or that the readings ruled out, would have no concentration at all, and a
+/// Dirichlet needs one.
+void apply_concentration_floor(std::span<double> concentration);
 
 /// Beliefs of a map that does not change meanwhile. Posteriors of equally touched voxels are computed once. Not
 /// thread-safe.

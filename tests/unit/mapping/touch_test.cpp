@@ -197,6 +197,40 @@ TEST_CASE("each voxel of a mixture region has the scalar update of its own state
   CHECK(voxels == map.touches.touches[0].region.voxels());
 }
 
+TEST_CASE("mixture readings go on from material ones, also where classes have no prior or were ruled out") {
+  std::vector<std::string> names = kMaterials;
+  names.push_back("paper");  // whose friction nobody measured
+  Map map = labelled_map(
+      kVoxel, {-0.2, -0.2, -0.1}, {0.2, 0.2, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); }, class_table(names),
+      [](const Eigen::Vector3d& p) { return p.x() < 0 ? int(snow) : 8; }, 5);
+  map.properties = friction();
+  TouchRequest first = reading(-0.1, 0.05, 0.19);
+  first.region.rule = RegionRule::sphere;
+  first.region.radius_m = 0.25;
+  touch(map, first);
+  for (int n = 1; n <= 6; ++n) {
+    TouchRequest next = first;
+    next.stamp_s = n, next.value = 0.2 + 0.01 * n, next.model = TouchModel::mixture;
+    touch(map, next);
+  }
+  const Region& region = map.touches.touches[0].region;
+  REQUIRE(region.voxels() > 100);
+  const MixtureState state = mixture_state(map, region);
+  for (const size_t refused : state.refused) CHECK(refused == 0);
+  // The batch over blocks is the scalar rule of each voxel.
+  Beliefs beliefs(map);
+  for (const MixtureBlock& block : state.blocks) {
+    size_t i = 0;
+    for_each_bit(block.mask, [&](int offset) {
+      const Index3 f = first_voxel(block.coord), v = voxel_of_offset(offset);
+      const Belief belief = beliefs.at({f.x + v.x, f.y + v.y, f.z + v.z});
+      REQUIRE(belief.refused == 0);
+      REQUIRE(block.a[ice * block.voxels + i] == Approx(belief.concentration[ice]).epsilon(2e-4));
+      ++i;
+    });
+  }
+}
+
 TEST_CASE("a voxel that the published projection cannot serve keeps its state and is counted") {
   Map map = two_floors(snow, wood, 1);
   Property door;
