@@ -20,7 +20,8 @@ namespace {
 
 ClassTable table(int k) {
   std::vector<ClassInfo> classes = {{0, "nothing", {}, true}};
-  for (int i = 1; i <= k; ++i) classes.push_back({uint16_t(3 * i), "class " + std::to_string(i), {}, false});
+  // A prior of 1, so that a count is found exactly when the prior is taken off.
+  for (int i = 1; i <= k; ++i) classes.push_back({uint16_t(3 * i), "class " + std::to_string(i), {}, false, 1});
   return ClassTable(classes);
 }
 
