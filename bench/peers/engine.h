@@ -20,7 +20,7 @@ public:
   virtual void prepare(const Frame& frame) = 0;
   virtual std::vector<Eigen::Vector3f> surface() = 0;
   /// Bytes of the distances and weights that the map holds, by its own count; none where it does not tell.
-  virtual std::optional<double> map_bytes() const = 0;
+  virtual std::optional<double> map_bytes() = 0;
   /// Blocks (8^3 voxels) that one frame updates on average: feltmap's only, for the machine's bound.
   virtual double blocks_per_frame() const { return 0; }
 };

@@ -22,7 +22,7 @@ public:
   std::vector<Eigen::Vector3f> surface() override {
     return extract_mesh(map_, {.normals = false, .colors = false}).positions;
   }
-  std::optional<double> map_bytes() const override { return double(map_.store.geometry_bytes()); }
+  std::optional<double> map_bytes() override { return double(map_.store.geometry_bytes()); }
   double blocks_per_frame() const override { return double(blocks_) / double(fused_); }
 
 private:

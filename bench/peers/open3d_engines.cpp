@@ -37,7 +37,7 @@ public:
     for (const auto& p : mesh.vertices_) out.push_back(p.cast<float>());
     return out;
   }
-  std::optional<double> map_bytes() const override {
+  std::optional<double> map_bytes() override {
     // Blocks that it has taken, not those it has room for: that is chosen beforehand.
     return double(grid_.GetHashMap().Size()) * resolution_ * resolution_ * resolution_ * 2 * sizeof(float);
   }
@@ -75,7 +75,7 @@ public:
     for (const auto& p : volume_.ExtractPointCloud()->points_) out.push_back(p.cast<float>());
     return out;
   }
-  std::optional<double> map_bytes() const override {
+  std::optional<double> map_bytes() override {
     double bytes = 0;
     for (const auto& [index, unit] : volume_.volume_units_)
       if (unit.volume_) bytes += double(unit.volume_->voxels_.size() * sizeof(unit.volume_->voxels_[0]));

@@ -39,7 +39,7 @@ public:
     }
     return out;
   }
-  std::optional<double> map_bytes() const override { return {}; }
+  std::optional<double> map_bytes() override { return {}; }
 
 private:
   cv::Ptr<cv::kinfu::Volume> volume_;
