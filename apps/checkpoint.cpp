@@ -49,6 +49,7 @@ json progress_of(const FusionRecord& record, const std::vector<Eigen::Isometry3d
           {"label_voxels", {record.labels.voxels, record.labels.unknown, record.labels.invalid}},
           {"unknown_ids", unknown},
           {"ignored_pixels", record.ignored_pixels},
+          {"without_labels", record.without_labels},
           {"touches", touches},
           {"viewpoints", poses_json(viewpoints)}};
 }
@@ -74,6 +75,7 @@ void read_progress(const json& progress, const std::string& where, Checkpoint& c
     for (const json& row : progress.at("unknown_ids"))
       record.unknown_ids[row.at(0).get<uint16_t>()] = row.at(1).get<uint64_t>();
     progress.at("ignored_pixels").get_to(record.ignored_pixels);
+    record.without_labels = progress.value("without_labels", int64_t{0});
     checkpoint.viewpoints = poses_of(progress.at("viewpoints"));
     progress.at("complete").get_to(checkpoint.complete);
     checkpoint.touches = progress.value("touches", "");

@@ -37,9 +37,13 @@ int run(const Arguments& a) {
                                          {"path", a.out.string()},
                                          {"written", result.written},
                                          {"skipped", result.skipped},
-                                         {"depth_out_of_range", result.depth_out_of_range}};
+                                         {"depth_out_of_range", result.depth_out_of_range},
+                                         {"left_out", result.left_out}};
     std::printf("%s\n", json.dump(2).c_str());
   } else if (!a.common.quiet) {
+    for (const std::string& what : result.left_out)
+      std::fprintf(stderr, "feltmap: warning: %s left out: the layout %s has no place for them\n", what.c_str(),
+                   a.options.layout.c_str());
     std::printf("%lld frames written to %s (%s)\n", static_cast<long long>(result.written), a.out.c_str(),
                 a.options.layout.c_str());
     for (const auto& [reason, count] : result.skipped)

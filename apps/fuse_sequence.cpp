@@ -35,6 +35,7 @@ void fuse_sequence(DecodeAhead& frames, const FrameSource& source, const Integra
       record.ignored_pixels += clear_depth_of(ignored_ids, frame);
       const FrameStats stats = integrate(map, frame, config, scratch);
       record.labels += stats.labels;
+      record.without_labels += frame.labels.empty() && frame.probabilities.empty();
       if (stats.labels.unknown > 0) count_unknown_ids(frame, map.classes, record.unknown_ids);
       record_frame(map.frames, source.recording, source.settings, frame.index);
       ++record.fused;

@@ -215,6 +215,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   const TouchPlan touches = plan_touches(options, *sequence, classes.table);
   prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite || options.resume);
   check_memory(*sequence, options);
+  for (const std::string& note : sequence->info().notes) spdlog::warn("{}", note);
   for (const Finding& fault : faults.get())
     spdlog::warn("{}: {} ({}); try {}, and see feltmap doctor", fault.topic, fault.belief, fault.evidence,
                  fault.remedy);

@@ -45,7 +45,8 @@ nlohmann::ordered_json to_json(const ReconstructReport& report, const nlohmann::
                       {"unknown_observations", fusion.labels.unknown},
                       {"invalid_observations", fusion.labels.invalid},
                       {"unknown_id_pixels", unknown},
-                      {"ignored_pixels", fusion.ignored_pixels}};
+                      {"ignored_pixels", fusion.ignored_pixels},
+                      {"frames_without", fusion.without_labels}};
   }
   json["peak_rss_bytes"] = report.peak_rss_bytes;
   json["time_s"] = {{"total", report.total_s}, {"decode", fusion.decode_s},        {"network", fusion.network_s},

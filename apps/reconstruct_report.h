@@ -24,6 +24,7 @@ struct FusionRecord {
   LabelStats labels;                         ///< summed over frames
   std::map<uint16_t, uint64_t> unknown_ids;  ///< label ids that the class table does not know, with their pixels
   uint64_t ignored_pixels = 0;               ///< of --ignore-classes
+  int64_t without_labels = 0;                ///< fused frames that carried neither labels nor probabilities
   std::string stopped;                       ///< why fusion ended before the last frame; empty: it did not
 };
 

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <limits>
@@ -23,7 +24,8 @@ using json = nlohmann::ordered_json;
 
 struct TouchOptions : CommonOptions {
   std::string map, at, property, file, out, undo, redo, properties, model = "material", projection = "kl";
-  double value = 0, sigma = 0, rho = std::numeric_limits<double>::quiet_NaN(), stamp_s = 0;
+  double value = 0, sigma = 0, stamp_s = 0;
+  std::optional<double> rho;
   bool dry_run = false, list = false;
   RegionOptions region;
   // A touch given by a frame of the sequence and a pixel.
@@ -150,9 +152,25 @@ TouchRequest request_of(const TouchOptions& options) {
   request.sigma = options.sigma;
   request.model = model_of_name(options.model);
   request.projection = projection_of_name(options.projection);
-  request.rho = options.rho;
+  if (options.rho) {
+    if (!std::isfinite(*options.rho))
+      throw TouchError(describe_mismatch("--rho", "correlation", "a number from 0 to below 1", "another"));
+    request.rho = *options.rho;
+  }
   request.region = options.region.resolved();
   return request;
+}
+
+/// Why a touch cannot have been recorded with the frames that the map was made of; nothing where it can, or nobody
+/// knows.
+std::optional<std::string> outside_recording(const Map& map, const RecordedTouch& touch) {
+  int64_t first = std::numeric_limits<int64_t>::max(), last = std::numeric_limits<int64_t>::min();
+  for (const FusedFrames& run : map.frames.runs)
+    for (const int64_t frame : run.frames) first = std::min(first, frame), last = std::max(last, frame);
+  if (!touch.frame || first > last || (*touch.frame >= first && *touch.frame <= last)) return std::nullopt;
+  return describe_mismatch("touch", "frame",
+                           "one of the map's, " + std::to_string(first) + " to " + std::to_string(last),
+                           std::to_string(*touch.frame));
 }
 
 int run_touch(const TouchOptions& options) {
@@ -164,38 +182,53 @@ int run_touch(const TouchOptions& options) {
   out["map"] = options.map;
   out["dry_run"] = options.dry_run;
   int code = kDone;
+  std::string said;
+  std::vector<TouchEffect> effects;
   if (!options.undo.empty() || !options.redo.empty()) {
     const bool undo = !options.undo.empty();
     const uint64_t id = id_of_text(undo ? options.undo : options.redo);
     undo ? undo_touch(map, id) : redo_touch(map, id);
     out[undo ? "undone" : "redone"] = id_text(id);
-    if (!options.json) std::printf("touch %s: %s\n", id_text(id).c_str(), undo ? "undone" : "redone");
+    said = "touch " + id_text(id) + (undo ? ": undone" : ": redone");
   } else if (!options.file.empty() || options.frame) {
     out["touches"] = json::array();
     const std::optional<OpenedSequence> opened = open_touched(options);
+    const std::vector<RecordedTouch> touches = recorded_touches(options);
     for (const TouchOutcome& outcome :
-         apply_recorded_touches(map, recorded_touches(options), request, opened ? &opened->touched : nullptr)) {
+         apply_recorded_touches(map, touches, request, opened ? &opened->touched : nullptr)) {
       const std::string where = options.file.empty() ? "frame " + std::to_string(*options.frame)
                                                      : options.file + ":" + std::to_string(outcome.touch.line);
-      if (outcome.effect) {
-        out["touches"].push_back(effect_json(map, *outcome.effect, request.region));
-        if (!options.json) print_effect(map, *outcome.effect, request.region);
-      } else {
+      const std::string refused =
+          opened ? outcome.refused : outside_recording(map, outcome.touch).value_or(outcome.refused);
+      if (!refused.empty()) {
         code = kInputOutput;
-        out["touches"].push_back({{"line", outcome.touch.line}, {"error", outcome.refused}});
-        std::fprintf(stderr, "feltmap: error: %s: %s\n", where.c_str(), outcome.refused.c_str());
+        std::fprintf(stderr, "feltmap: error: %s: %s\n", where.c_str(), refused.c_str());
+      } else {
+        out["touches"].push_back(effect_json(map, *outcome.effect, request.region));
+        effects.push_back(*outcome.effect);
       }
     }
+    if (touches.empty()) {
+      code = kInputOutput;
+      std::fprintf(stderr, "feltmap: error: %s\n",
+                   describe_mismatch(options.file, "touches", "at least one", "none").c_str());
+    }
+    if (code != kDone) return code;  // all of them, or none
   } else {
     const std::optional<ViewMask> view = options.region.view();
-    const TouchEffect effect = apply_touch(map, resolve_touch(map, request, view ? &*view : nullptr));
-    out.update(effect_json(map, effect, request.region));
-    if (!options.json) print_effect(map, effect, request.region);
+    effects.push_back(apply_touch(map, resolve_touch(map, request, view ? &*view : nullptr)));
+    out.update(effect_json(map, effects.back(), request.region));
   }
   out["map_hash"] = map_hash(map);
-  if (code == kDone && !options.dry_run) save_map(map, options.out.empty() ? options.map : options.out);
-  if (options.json) std::printf("%s\n", out.dump(2).c_str());
-  return code;
+  if (!options.dry_run) save_map(map, options.out.empty() ? options.map : options.out);
+  // Only what is done is said to be.
+  if (options.json) {
+    std::printf("%s\n", out.dump(2).c_str());
+  } else {
+    if (!said.empty()) std::printf("%s\n", said.c_str());
+    for (const TouchEffect& effect : effects) print_effect(map, effect, request.region);
+  }
+  return kDone;
 }
 
 }  // namespace

@@ -153,6 +153,7 @@ Table read_csv(const fs::path& path, const std::string& content) {
 
 ClassTable read_class_table(const fs::path& path) {
   const std::string content = read_whole_file(path, kLimitBytes);
+  require_utf8(content, path.string());
   Table table = path.extension() == ".csv" ? read_csv(path, content) : read_yaml(path, content);
   try {
     ClassTable classes(std::move(table.classes));

@@ -1,11 +1,14 @@
 #include "io/convert.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
 #include "core/error.h"
+#include "io/class_table_file.h"
 #include "io/image_encode.h"
+#include "io/text_input.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -75,6 +78,14 @@ public:
   }
 
   void add(const Frame& frame, ConvertResult& result) {
+    const auto lost = [&](bool there, const char* pattern, const char* what) {
+      if (there && *pattern == 0 &&
+          std::find(result.left_out.begin(), result.left_out.end(), what) == result.left_out.end())
+        result.left_out.emplace_back(what);
+    };
+    lost(!frame.labels.empty(), names_.labels, "labels");
+    lost(!frame.probabilities.empty(), names_.probabilities, "probabilities");
+    lost(!frame.instances.empty(), names_.instances, "instances");
     const int64_t i = from_zero_ ? result.written : frame.index;
     put(named(names_.depth, i), encode_png(stored_depth(frame.depth_m, depth_scale_, result.depth_out_of_range)));
     const std::string color = named(names_.color, i) + (jpeg_ ? ".jpg" : ".png");
@@ -128,7 +139,22 @@ public:
     } else {
       put(layout == "7scenes" ? "camera-intrinsics.txt" : "intrinsics.txt", rows);
     }
-    if (!info_.classes.empty()) put("classes.yaml", classes_text());
+    if (!info_.classes.empty()) put("classes.yaml", class_table_yaml(info_.classes));
+  }
+
+  /// The property table and the touches that the sequence carries, as they are; only `generic` has a place for them,
+  /// and touches name frames by their numbers.
+  void add_tables(ConvertResult& result) {
+    const bool generic = names_.layout == std::string("generic");
+    const auto copy = [&](const fs::path& file, const char* name, bool keeps) {
+      if (file.empty()) return;
+      if (keeps)
+        put(name, read_whole_file(file));
+      else
+        result.left_out.push_back(file.filename().string());
+    };
+    copy(info_.properties_file, "properties.yaml", generic);
+    copy(info_.touches_file, "touches.csv", generic && !from_zero_);
   }
 
 private:
@@ -157,18 +183,6 @@ private:
         stack.data()[(top + m) * pixels + p] = uint16_t(std::lround(image.probability[p * top + m] * 65535));
       }
     return stack;
-  }
-
-  std::string classes_text() const {
-    std::string text = "classes:\n";
-    for (const ClassInfo& info : info_.classes.classes()) {
-      std::string name;
-      for (const char c : info.name) name += c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
-      text += "  - {id: " + std::to_string(info.id) + ", name: \"" + name + "\", color: [" +
-              std::to_string(info.color.r) + ", " + std::to_string(info.color.g) + ", " + std::to_string(info.color.b) +
-              "]" + (info.ignore ? ", ignore: true" : "") + "}\n";
-    }
-    return text;
   }
 
   const FileNames& names_;
@@ -210,6 +224,9 @@ Image<uint16_t> stored_depth(const DepthImage& depth_m, double depth_scale, int6
 ConvertResult convert_sequence(const SequenceReader& reader, const fs::path& out, const ConvertOptions& options,
                                const std::function<bool(int64_t)>& progress) {
   const FileNames& names = names_of(options.layout);
+  if (!(options.depth_scale >= 0 && options.depth_scale <= kMostDepthScale))
+    throw ConfigError(describe_mismatch("--written-depth-scale", "units per metre", "at most 1000000, or 0",
+                                        std::to_string(options.depth_scale)));
   std::error_code fault;
   if (fs::exists(out, fault) && !(fs::is_directory(out) && fs::is_empty(out)))
     throw IoError(describe_mismatch(out.string(), "output", "a folder that does not exist yet", "something there"));
@@ -236,6 +253,7 @@ ConvertResult convert_sequence(const SequenceReader& reader, const fs::path& out
       throw FormatError(
           describe_mismatch(reader.info().path.string(), "frames", "at least one that can be read", "none"));
     writer.finish();
+    writer.add_tables(result);
   } catch (...) {
     fs::remove_all(partial, fault);
     throw;

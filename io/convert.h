@@ -18,10 +18,14 @@ struct ConvertOptions {
   bool jpeg_color = false;         ///< instead of PNG, which keeps every value
 };
 
+/// Stored depth finer than a micrometre is a mistake.
+constexpr double kMostDepthScale = 1e6;
+
 struct ConvertResult {
   int64_t written = 0;
   std::map<std::string, int64_t> skipped;  ///< frames that could not be read, by reason
   int64_t depth_out_of_range = 0;          ///< measured pixels too far for 16 bits at the scale: stored as 0
+  std::vector<std::string> left_out;       ///< what the sequence carries and the layout has no place for
 };
 
 std::vector<std::string> writable_layouts();

@@ -159,9 +159,13 @@ void apply_options(const SequenceOptions& options, SequenceListing& listing) {
   if (options.pose_stamp_offset != 0 && listing.layout != kTumLayout.name)
     shift_poses(options.pose_stamp_offset, listing);
   if (!(listing.depth_scale > 0 && listing.depth_scale < 1e9))
-    throw ConfigError(
-        describe_mismatch("depth scale", "units per metre", "a number above 0", std::to_string(listing.depth_scale)));
+    throw ConfigError(describe_mismatch("depth scale", "units per metre", "a number above 0 and below 1000000000",
+                                        std::to_string(listing.depth_scale)));
   choose_class_table(options, listing);
+  const bool labelled = std::any_of(listing.frames.begin(), listing.frames.end(),
+                                    [](const FrameRecord& frame) { return !frame.labels.empty(); });
+  if (labelled && listing.classes.empty() && options.labels_dir.empty())
+    listing.notes.push_back("label images without a class table: they are not used (--classes FILE names one)");
   if (!options.labels_dir.empty()) attach_labels(options.labels_dir, listing);
   if (!options.probs_dir.empty()) attach_probabilities(options.probs_dir, listing);
   if (!options.instances_dir.empty()) attach_instances(options.instances_dir, listing);

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "io/text_input.h"
 
 namespace felt {
 namespace {
@@ -113,6 +114,7 @@ Property read_property(Walker& walker, const std::string& name, const YAML::Node
 }  // namespace
 
 PropertyTable parse_properties(const std::string& text, const std::string& where) {
+  require_utf8(text, where);
   YAML::Node document;
   try {
     document = YAML::Load(text);

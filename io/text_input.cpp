@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cstdio>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "core/error.h"
 
@@ -96,6 +97,14 @@ std::vector<double> parse_numbers(std::string_view line, const std::string& wher
     numbers.push_back(*number);
   }
   return numbers;
+}
+
+void require_utf8(std::string_view text, const std::string& where) {
+  try {
+    (void)nlohmann::json(std::string(text)).dump();
+  } catch (const nlohmann::json::exception&) {
+    throw ConfigError(describe_mismatch(where, "text", "UTF-8", "other bytes"));
+  }
 }
 
 }  // namespace felt

@@ -13,6 +13,9 @@ namespace felt {
 /// larger than `limit_bytes`.
 std::string read_whole_file(const std::filesystem::path& path, size_t limit_bytes = size_t(1) << 30);
 
+/// Throws ConfigError naming `where` unless the text is UTF-8, which names in a map must be.
+void require_utf8(std::string_view text, const std::string& where);
+
 /// Walks the lines of a text: a byte order mark and Windows line ends are dropped, lines are counted from 1.
 class LineReader {
 public:

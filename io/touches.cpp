@@ -72,7 +72,7 @@ RecordedTouch parse_row(const std::vector<std::string>& cells, const Columns& co
     if (!touch.frame)
       problems.push_back(describe_mismatch(where, "frame", "a frame number", "'" + cells[columns["frame"]] + "'"));
   }
-  if (columns.has("x"))
+  if (columns.has("x") && columns.has("y") && columns.has("z"))
     touch.point_m = Eigen::Vector3d(real("x"), real("y"), real("z"));
   else
     touch.pixel = Eigen::Vector2d(real("u"), real("v"));

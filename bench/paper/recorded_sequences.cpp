@@ -85,7 +85,7 @@ void icl_living_room(const Options& options, Checks& checks) {
     IntegrationScratch scratch;
     for (const Frame& frame : seen) integrate(map, frame, config, scratch);
     const LabelScores s = score(map, recording, false);
-    print_row(calibrated ? "**ours**: map, confusion learned from the first half" : "map, counts", s);
+    print_row(calibrated ? "**ours**: map, confusion learned from the first half" : "map, counts on a prior of 1", s);
     if (calibrated) {
       checks.better("ICL living room: ECE of counts less that with the network's confusion",
                     ece_of_counts - s.calibration.ece(), 0);

@@ -61,6 +61,7 @@ public:
                        percent(theirs.meets) + " (" + percent(theirs.residual) + " off)" +
                        (differs ? " as read now" : " otherwise");
     if (finding.faulty) finding.remedy = remedy;
+    if (differs && !finding.faulty) finding.belief += " would fit a little better, not clearly";
     list.push_back(finding);
   }
   const Reading& best() const { return best_; }

@@ -113,7 +113,13 @@ void read_settings(const fs::path& file, SequenceListing& listing, std::map<std:
     for (const auto& [key, value] : paths) known.insert(key);
     settings.refuse_unknown(given, known);
     for (auto& [key, value] : paths)
-      if (given[key] && given[key].IsScalar()) value = given[key].Scalar();
+      if (given[key] && given[key].IsScalar()) {
+        value = given[key].Scalar();
+        // A name is a promise; only the defaults may be absent.
+        if (!fs::exists(file.parent_path() / value))
+          throw FormatError(
+              describe_mismatch(file.string(), "paths: " + key, "a file or folder", "none at '" + value + "'"));
+      }
   }
   if (!settings.problems.empty()) throw ConfigError(settings.problems);
 }

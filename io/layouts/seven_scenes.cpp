@@ -1,5 +1,6 @@
 #include "core/error.h"
 #include "io/camera_file.h"
+#include "io/class_table_file.h"
 #include "io/layouts.h"
 #include "io/layouts/file_names.h"
 #include "io/layouts/frame_files.h"
@@ -51,6 +52,9 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
       listing.notes.push_back("no camera-intrinsics.txt: the depth camera of 7-Scenes (585, 585, 320, 240) is assumed");
     }
   }
+  for (const fs::path& place : {folder, above})
+    if (const fs::path table = first_existing(place, {"classes.yaml"}); !table.empty() && listing.classes.empty())
+      listing.classes = read_class_table(table);
   // The picking challenge's recordings share these names but rotate the depth bits and count 0.1 mm.
   if (camera.filename() == "camera-intrinsics.color.txt") {
     listing.depth_encoding = DepthEncoding::rotated3;

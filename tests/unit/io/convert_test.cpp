@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "io/open_sequence.h"
+#include "io/text_input.h"
 #include "tests/support/data.h"
 #include "tests/support/recorded_sequence.h"
 
@@ -35,7 +36,24 @@ TEST_CASE("a converted sequence gives the frames it was made of, in every layout
       REQUIRE(std::abs(after.depth_m.data()[p] - before.depth_m.data()[p]) < 0.51 / converted->info().depth_scale);
     if (converted->info().has_labels) CHECK(after.labels == before.labels);
   }
+  if (converted->info().has_labels) CHECK(converted->info().classes == original->info().classes);
   CHECK(converted->info().has_labels == (layout != "tum" && layout != "redwood"));
+}
+
+TEST_CASE("a conversion keeps the property table and the touches, or says that it left them out") {
+  TemporaryDirectory folder;
+  write_generic(folder.path() / "recording", 2);
+  write_text(folder.path() / "recording" / "properties.yaml", "friction: {priors: {ice: {mean: 0.2, sd: 0.05}}}\n");
+  write_text(folder.path() / "recording" / "touches.csv", "frame,x,y,z,property,value\n0,0,0,1,friction,0.2\n");
+  const auto original = open_sequence(folder.path() / "recording");
+  const ConvertResult kept = convert_sequence(*original, folder.path() / "generic", {});
+  CHECK(kept.left_out.empty());
+  const auto converted = open_sequence(folder.path() / "generic");
+  CHECK(converted->info().properties_file == folder.path() / "generic" / "properties.yaml");
+  CHECK(read_whole_file(converted->info().touches_file) == read_whole_file(original->info().touches_file));
+  const ConvertResult lost = convert_sequence(*original, folder.path() / "tum", {.layout = "tum"});
+  CHECK(lost.left_out == std::vector<std::string>{"labels", "properties.yaml", "touches.csv"});
+  CHECK_THROWS_AS(convert_sequence(*original, folder.path() / "fine", {.depth_scale = 1e9}), ConfigError);
 }
 
 TEST_CASE("conversion leaves nothing behind where it fails or is stopped, and replaces nothing") {
