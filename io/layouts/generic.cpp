@@ -115,10 +115,9 @@ void read_settings(const fs::path& file, SequenceListing& listing, std::map<std:
     for (auto& [key, value] : paths)
       if (given[key] && given[key].IsScalar()) {
         value = given[key].Scalar();
-        // A name is a promise; only the defaults may be absent.
         if (!fs::exists(file.parent_path() / value))
-          throw FormatError(
-              describe_mismatch(file.string(), "paths: " + key, "a file or folder", "none at '" + value + "'"));
+          listing.notes.push_back(
+              describe_mismatch(file.string(), "paths: " + key, "'" + value + "'", "nothing there"));
       }
   }
   if (!settings.problems.empty()) throw ConfigError(settings.problems);
