@@ -80,7 +80,7 @@ std::string faults(Map& map, TouchModel model) {
         size_t left = i;
         for_each_bit(block.mask, [&](int offset) {
           if (left-- != 0) return;
-          vision.assign(k, 1.0);
+          vision.assign(k, map.classes.prior(0));
           for (const EvidencePlane& e : map.store.get(block.coord)->evidence)
             vision[e.slot] += double(e.counts->value[offset]);
         });
