@@ -49,7 +49,6 @@ void add_label_options(CLI::App& command, LabelSettings& s) {
   command
       .add_option("--confusion", s.confusion,
                   "What the network takes for what: CSV or YAML, for example of calibrate-labels")
-      ->check(CLI::ExistingFile)
       ->option_text("FILE")
       ->group(group);
   command
