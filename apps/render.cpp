@@ -28,6 +28,7 @@ struct RenderCommand {
   std::string map, out, trajectory, overview, properties, up = "0,0,1";
   std::vector<std::string> poses;
   std::vector<std::string> images = {"depth", "normal", "color"}, more_images;
+  CLI::Option* images_option = nullptr;
   bool colored = false;
   ViewOptions options;
 };
@@ -182,14 +183,16 @@ void add_render(CLI::App& app) {
        "feltmap render out/map.vdb --trajectory poses.txt --images class,friction.mean --colored --out views\n"
        "feltmap render out/map.vdb --overview picture.png --up 0,0,1"},
       command.common, [] {
+        if (command.images_option->count() == 0 && !command.more_images.empty())
+          throw CLI::ExtrasError(command.more_images);
         command.images.insert(command.images.end(), command.more_images.begin(), command.more_images.end());
         return render(command);
       });
   // Words after --images that name images are no map, wherever the map stands.
   sub.validate_positionals();
-  sub.add_option("MAP", command.map, "Map file")
-      ->required()
-      ->check([](const std::string& word) { return names_images(word) ? "'" + word + "' names an image" : ""; });
+  sub.add_option("MAP", command.map, "Map file")->required()->check([](const std::string& word) {
+    return names_images(word) ? "'" + word + "' names an image" : "";
+  });
   sub.add_option("--pose", command.poses,
                  "Camera-to-world pose: tx,ty,tz,qx,qy,qz,qw or 12 or 16 numbers of a matrix (repeatable)")
       ->allow_extra_args(false);
@@ -198,17 +201,14 @@ void add_render(CLI::App& app) {
                  "Folder for the images: <number>.<image>.png; depth in millimetres, entropy in "
                  "thousandths of a nat, classes as ids, properties from 1 to 65535 between the ends that --json "
                  "tells, 16 bit each");
-  CLI::Option* const images =
+  command.images_option =
       sub.add_option("--images", command.images,
                      "Which images, with commas or blanks between them: depth, normal, color, class, entropy, and "
                      "PROPERTY.mean or PROPERTY.sd of each property")
           ->delimiter(',')
           ->allow_extra_args(false)
           ->capture_default_str();
-  sub.add_option("IMAGES", command.more_images, "Further words after --images")
-      ->delimiter(',')
-      ->needs(images)
-      ->group("");
+  sub.add_option("IMAGES", command.more_images, "Further words after --images")->delimiter(',')->group("");
   sub.add_flag("--colored", command.colored,
                "Also write class, entropy and property images in colour, to look at: <number>.<image>.color.png");
   sub.add_option("--properties", command.properties, "Property table (YAML), for a map that has none");

@@ -60,9 +60,10 @@ public:
       const auto times = std::count(column_slot_.begin(), column_slot_.end(), slot);
       if (times == 0) missing.push_back(classes_.at_slot(slot).name);
       if (times > 1)
-        problem(at, "column " + quoted(classes_.at_slot(slot).name), "it once", "it " + std::to_string(times) + " times");
+        problem(at, "column " + quoted(classes_.at_slot(slot).name), "it once",
+                "it " + std::to_string(times) + " times");
     }
-    if (!missing.empty()) problem(at, "columns", "every class", "none of " + list_of(missing));
+    if (!missing.empty()) problem(at, "columns", "every class", "none for " + list_of(missing));
   }
 
   void row(const std::string& name, const std::vector<std::string>& cells, const std::string& at) {
@@ -88,7 +89,7 @@ public:
     std::vector<std::string> missing;
     for (int slot = 0; slot < classes_.size(); ++slot)
       if (!has_row_[size_t(slot)]) missing.push_back(classes_.at_slot(slot).name);
-    if (!missing.empty()) problem(where_, "rows", "every class", "none of " + list_of(missing));
+    if (!missing.empty()) problem(where_, "rows", "every class", "none for " + list_of(missing));
     if (!problems_.empty()) throw ConfigError(first_of(problems_));
     return std::move(counts_);
   }

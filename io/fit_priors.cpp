@@ -31,8 +31,7 @@ std::vector<ClassReadings> read_readings_csv(const std::filesystem::path& file) 
       value_column = column("value");
       group_column = column("group");
       if (class_column == header.size() || value_column == header.size()) {
-        throw FormatError(
-            describe_mismatch(where, "header", "columns 'class', 'value' and perhaps 'group'",
+        throw FormatError(describe_mismatch(where, "header", "columns 'class', 'value' and perhaps 'group'",
                                             "'" + std::string(lines.line().substr(0, 60)) + "'"));
       }
       continue;

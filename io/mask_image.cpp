@@ -79,8 +79,8 @@ std::vector<Eigen::Vector3d> read_points(const std::filesystem::path& file) {
     if (good)
       points.push_back(p);
     else
-      problems.push_back(describe_mismatch(lines.where(), "point", "x,y,z",
-                                           "'" + std::string(lines.line().substr(0, 60)) + "'"));
+      problems.push_back(
+          describe_mismatch(lines.where(), "point", "x,y,z", "'" + std::string(lines.line().substr(0, 60)) + "'"));
   }
   if (!problems.empty()) throw FormatError(first_of(problems));
   return points;
