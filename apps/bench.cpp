@@ -9,6 +9,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/number_checks.h"
 #include "core/error.h"
 #include "core/simd.h"
 #include "io/open_sequence.h"
@@ -131,10 +132,10 @@ void add_bench(CLI::App& app) {
   command.add_option("SEQUENCE", options->sequence, "Folder of a recorded RGB-D sequence, or a .sens file")->required();
   command.add_option("--voxel-sizes", options->voxel_sizes_m, "Edges of a voxel, metres")->capture_default_str();
   command.add_option("--max-frames", options->frames, "Frames that are decoded and held in memory")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
   command.add_option("--repetitions", options->repetitions, "Times that each setting runs; the best of a frame counts")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
 }
 

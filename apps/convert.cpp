@@ -5,6 +5,7 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/interrupt.h"
+#include "apps/number_checks.h"
 #include "apps/progress.h"
 #include "apps/reading_options.h"
 #include "io/convert.h"
@@ -72,7 +73,7 @@ void add_convert(CLI::App& app) {
   command
       .add_option("--written-depth-scale", a->options.depth_scale,
                   "Stored depth units per metre in the result; 0: the layout's own")
-      ->check(CLI::NonNegativeNumber)
+      ->check(at_least_zero())
       ->capture_default_str();
   command.add_flag("--renumber", a->options.renumber, "Number frames from 0");
   command.add_flag("--jpeg", a->options.jpeg_color, "Colour as JPEG instead of PNG");

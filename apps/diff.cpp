@@ -4,6 +4,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/number_checks.h"
 #include "io/map_diff_report.h"
 #include "io/map_file.h"
 
@@ -45,7 +46,7 @@ void add_diff(CLI::App& app) {
       .add_option("--tol", options->tolerance,
                   "Greatest difference of a value that counts as equal, in the grid's own unit (metres, weight, grey "
                   "levels, counts)")
-      ->check(CLI::NonNegativeNumber)
+      ->check(at_least_zero())
       ->capture_default_str();
 }
 

@@ -7,6 +7,7 @@
 #include "apps/commands.h"
 #include "apps/evaluation_report.h"
 #include "apps/exit_code.h"
+#include "apps/number_checks.h"
 #include "apps/progress.h"
 #include "apps/touch_options.h"
 #include "core/error.h"
@@ -287,11 +288,10 @@ void add_evaluate(CLI::App& app) {
                    "feltmap evaluate out/map.vdb --reference-labels scene/truth --reliability reliability.svg --json\n"
                    "feltmap evaluate out/map.vdb --reference-readings held_out.csv"},
                   command.common, [] { return evaluate(command); });
-  sub.add_option("INPUT", command.input, "Map (.vdb) or mesh (.ply, .obj)")->required()->check(CLI::ExistingFile);
+  sub.add_option("INPUT", command.input, "Map (.vdb) or mesh (.ply, .obj)")->required();
 
   const char* geometry = "Geometry";
   sub.add_option("--reference-mesh", command.reference_mesh, "Exact mesh (.ply, .obj) in the same world frame")
-      ->check(CLI::ExistingFile)
       ->group(geometry);
   sub.add_option("--samples", command.geometry.samples, "Samples on each mesh")
       ->check(CLI::Range(size_t(1), size_t(100000000)))
@@ -299,12 +299,11 @@ void add_evaluate(CLI::App& app) {
       ->group(geometry);
   sub.add_option("--seed", command.geometry.seed, "Of the samples")->capture_default_str()->group(geometry);
   sub.add_option("--threshold", command.geometry.threshold_m, "Metres, of precision, recall and F-score")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str()
       ->group(geometry);
   sub.add_option("--trajectory", command.trajectory,
                  "Recorded sequence, or a file with one pose a line: only what it saw of the reference counts")
-      ->check(CLI::ExistingPath)
       ->group(geometry);
   sub.add_flag("--cull-reconstruction", command.geometry.cull_reconstruction,
                "Leave out what the trajectory did not see of the reconstruction, too")
@@ -317,7 +316,6 @@ void add_evaluate(CLI::App& app) {
 
   const char* labels = "Labels";
   sub.add_option("--reference-labels", command.reference_labels, "Sequence with true labels, in the map's world frame")
-      ->check(CLI::ExistingPath)
       ->group(labels);
   sub.add_option("--labels", command.labels, "Folder of true label images, where the sequence has others or none")
       ->group(labels);
@@ -335,7 +333,6 @@ void add_evaluate(CLI::App& app) {
   const char* properties = "Properties";
   sub.add_option("--reference-readings", command.reference_readings,
                  "Readings that the map was not given (as touches.csv): how good are its forecasts?")
-      ->check(CLI::ExistingFile)
       ->group(properties);
   sub.add_option("--properties", command.properties, "Property table (YAML), for a map that has none")
       ->group(properties);

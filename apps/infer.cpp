@@ -11,6 +11,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/number_checks.h"
 #include "core/error.h"
 #include "core/simd.h"
 #include "io/fit_priors.h"
@@ -91,7 +92,7 @@ void add_infer(CLI::App& app) {
       ->capture_default_str();
   command.add_option("--unit", options->unit, "Unit of the property in --properties-out")->capture_default_str();
   command.add_option("--max-nu", options->max_nu_0, "Most readings that a fitted prior may stand for")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
   command.add_option("--simd", options->simd, "Target of the kernels: scalar, sse4, avx2, avx3 (best one if absent)");
 }

@@ -44,12 +44,13 @@ void add_label_options(CLI::App& command, LabelSettings& s) {
       .add_option("--label-turn", s.novelty_deg,
                   "The same in degrees turned: the greater of both counts" + bracketed(standard.novelty_deg))
       ->group(group);
-  command.add_option("--class-prior", s.class_prior, "Concentration of every class before anything was seen [1; of k > 8 classes 8/k]")
+  command
+      .add_option("--class-prior", s.class_prior,
+                  "Concentration of every class before anything was seen [1; of k > 8 classes 8/k]")
       ->group(group);
   command
       .add_option("--confusion", s.confusion,
                   "What the network takes for what: CSV or YAML, for example of calibrate-labels")
-      ->check(CLI::ExistingFile)
       ->option_text("FILE")
       ->group(group);
   command

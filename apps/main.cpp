@@ -4,6 +4,7 @@
 #include <new>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "apps/commands.h"
 #include "apps/exit_code.h"
@@ -58,6 +59,14 @@ int run(int argc, char** argv) {
   } catch (const CLI::Success& e) {
     return app.exit(e);  // --help, --version
   } catch (const CLI::ParseError& e) {
+    // CLI11 would only say that a subcommand is missing.
+    const std::vector<std::string> unknown = app.remaining();
+    if (app.get_subcommands().empty() && !unknown.empty()) {
+      std::string names;
+      for (const CLI::App* command : app.get_subcommands({}))
+        names.append(names.empty() ? "" : ", ").append(command->get_name());
+      return fail(kUsage, "'" + unknown.front() + "': expected one of " + names + " (see feltmap --help)");
+    }
     return fail(kUsage, std::string(e.what()) + " (see feltmap --help)");
   }
 }

@@ -7,6 +7,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/number_checks.h"
 #include "io/map_file.h"
 #include "mapping/merge.h"
 
@@ -66,7 +67,7 @@ void add_merge(CLI::App& app) {
   command.add_flag("--allow-shared-frames", options->merge.allow_shared_frames,
                    "Merge although the journals share frames, which then count twice");
   command.add_option("--max-weight", options->merge.max_weight, "Cap of the summed weight, as in reconstruct")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
 }
 

@@ -27,7 +27,6 @@ void PerceptionArguments::add_to(CLI::App& command, const char* group, const cha
       ->transform(CLI::CheckedTransformer(kSources).description(""))
       ->group(group);
   command.add_option("--masks", instances, "Folder of instance images, or of a folder of masks for each frame")
-      ->check(CLI::ExistingDirectory)
       ->group(group);
   command
       .add_option("--segment-color", color_step,

@@ -10,6 +10,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/number_checks.h"
 #include "apps/touch_options.h"
 #include "io/map_file.h"
 #include "io/mask_image.h"
@@ -112,7 +113,7 @@ void add_query(CLI::App& app) {
       ->allow_extra_args(false);
   where.add_option("--file", options->file, "Points: one x,y,z a line");
   command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
-  command.add_option("--below", options->below, "Probability that a property is at most this");
+  command.add_option("--below", options->below, "Probability that a property is at most this")->check(finite());
 }
 
 }  // namespace felt::apps

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "apps/label_options.h"
+#include "apps/number_checks.h"
 #include "core/error.h"
 #include "io/reconstruct_config.h"
 
@@ -72,7 +73,7 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
   command
       .add_option("--checkpoint", a.checkpoint_every,
                   "Save the map every so many frames, so that no accident loses more than those; 0: at the end only")
-      ->check(CLI::NonNegativeNumber)
+      ->check(at_least_zero())
       ->option_text("N");
   command.add_flag("--resume", a.resume,
                    "Go on with the map in --out, however its run ended; the result is that of a run that never ended");

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "io/open_sequence.h"
 #include "io/property_yaml.h"
+#include "io/text_input.h"
 
 namespace felt::apps {
 namespace {
@@ -65,7 +66,7 @@ TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& 
   plan.sequence = open_sequence(options.sequence, every);
   const TouchedSequence sequence = touched_sequence(*plan.sequence);
   const auto [first_s, last_s] = selected_span(selected);
-  std::string problems;
+  std::vector<std::string> problems;
   std::vector<RecordedTouch> within;
   for (const RecordedTouch& touch : plan.touches) {
     try {
@@ -76,11 +77,10 @@ TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& 
       else
         ++plan.left_out;
     } catch (const TouchError& error) {
-      problems.append(problems.empty() ? "" : "\n")
-          .append(plan.file.string() + ":" + std::to_string(touch.line) + ": " + error.what());
+      problems.push_back(plan.file.string() + ":" + std::to_string(touch.line) + ": " + error.what());
     }
   }
-  if (!problems.empty()) throw FormatError(problems);
+  if (!problems.empty()) throw FormatError(first_of(problems));
   plan.touches = std::move(within);
   return plan;
 }

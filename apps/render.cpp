@@ -8,6 +8,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/number_checks.h"
 #include "apps/touch_options.h"
 #include "core/error.h"
 #include "io/map_file.h"
@@ -26,7 +27,8 @@ struct RenderCommand {
   CameraOptions camera;
   std::string map, out, trajectory, overview, properties, up = "0,0,1";
   std::vector<std::string> poses;
-  std::vector<std::string> images = {"depth", "normal", "color"};
+  std::vector<std::string> images = {"depth", "normal", "color"}, more_images;
+  CLI::Option* images_option = nullptr;
   bool colored = false;
   ViewOptions options;
 };
@@ -63,6 +65,16 @@ std::optional<PropertyImage> property_image_of(const Map& map, const std::string
     image.high = std::max(image.high, image.sd ? 3 * prior.sd : prior.mean + prior.sd);
   }
   return image;
+}
+
+/// Whether a word of the command line is a list of images and so no map.
+bool names_images(const std::string& word) {
+  const auto names_image = [](const std::string& name) {
+    return std::find(kImages.begin(), kImages.end(), name) != kImages.end() || name.ends_with(".mean") ||
+           name.ends_with(".sd");
+  };
+  const std::vector<std::string> names = CLI::detail::split(word, ',');
+  return std::all_of(names.begin(), names.end(), names_image);
 }
 
 /// Everything that the images of a view are made from.
@@ -170,29 +182,39 @@ void add_render(CLI::App& app) {
        "feltmap render out/map.vdb --pose 0,0,1.5,0.5,-0.5,0.5,-0.5 --images depth,color --out views\n"
        "feltmap render out/map.vdb --trajectory poses.txt --images class,friction.mean --colored --out views\n"
        "feltmap render out/map.vdb --overview picture.png --up 0,0,1"},
-      command.common, [] { return render(command); });
-  sub.add_option("MAP", command.map, "Map file")->required()->check(CLI::ExistingFile);
+      command.common, [] {
+        if (command.images_option->count() == 0 && !command.more_images.empty())
+          throw CLI::ExtrasError(command.more_images);
+        command.images.insert(command.images.end(), command.more_images.begin(), command.more_images.end());
+        return render(command);
+      });
+  // Words after --images that name images are no map, wherever the map stands.
+  sub.validate_positionals();
+  sub.add_option("MAP", command.map, "Map file")->required()->check([](const std::string& word) {
+    return names_images(word) ? "'" + word + "' names an image" : "";
+  });
   sub.add_option("--pose", command.poses,
                  "Camera-to-world pose: tx,ty,tz,qx,qy,qz,qw or 12 or 16 numbers of a matrix (repeatable)")
       ->allow_extra_args(false);
-  sub.add_option("--trajectory", command.trajectory, "Text file with one such pose a line, a stamp before it or not")
-      ->check(CLI::ExistingFile);
+  sub.add_option("--trajectory", command.trajectory, "Text file with one such pose a line, a stamp before it or not");
   sub.add_option("--out", command.out,
                  "Folder for the images: <number>.<image>.png; depth in millimetres, entropy in "
                  "thousandths of a nat, classes as ids, properties from 1 to 65535 between the ends that --json "
                  "tells, 16 bit each");
-  sub.add_option(
-         "--images", command.images,
-         "Which images: depth, normal, color, class, entropy, and PROPERTY.mean or PROPERTY.sd of each property")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->capture_default_str();
+  command.images_option =
+      sub.add_option("--images", command.images,
+                     "Which images, with commas or blanks between them: depth, normal, color, class, entropy, and "
+                     "PROPERTY.mean or PROPERTY.sd of each property")
+          ->delimiter(',')
+          ->allow_extra_args(false)
+          ->capture_default_str();
+  sub.add_option("IMAGES", command.more_images, "Further words after --images")->delimiter(',')->group("");
   sub.add_flag("--colored", command.colored,
                "Also write class, entropy and property images in colour, to look at: <number>.<image>.color.png");
   sub.add_option("--properties", command.properties, "Property table (YAML), for a map that has none");
   add_camera_options(sub, command.camera);
   sub.add_option("--max-depth", command.options.max_depth_m, "Metres along the optical axis")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
   sub.add_option("--overview", command.overview, "One picture of the whole map from outside and above (PNG)");
   sub.add_option("--up", command.up, "Upward direction in the world, for --overview")->capture_default_str();

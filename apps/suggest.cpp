@@ -6,6 +6,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/number_checks.h"
 #include "apps/touch_options.h"
 #include "io/map_file.h"
 #include "mapping/touch_suggestion.h"
@@ -77,7 +78,7 @@ void add_suggest(CLI::App& app) {
   command.add_option("map", options->map, "Map file")->required();
   command.add_option("--property", options->property, "What would be measured")->required();
   command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
-  command.add_option("--top", options->settings.most, "How many segments to name")->check(CLI::PositiveNumber);
+  command.add_option("--top", options->settings.most, "How many segments to name")->check(above_zero());
   command.add_option("--region", options->rule, "connected: what a touch would update; segment: the map's segments")
       ->check(CLI::IsMember({"connected", "segment"}))
       ->capture_default_str();

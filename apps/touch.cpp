@@ -264,8 +264,7 @@ void add_touch(CLI::App& app) {
   command.add_option("--pixel", options->pixel, "u,v of the touch; with --region mask its region is the segment there")
       ->delimiter(',')
       ->expected(2);
-  command.add_option("--masks", options->masks, "Folder of instance images or masks to take that segment from")
-      ->check(CLI::ExistingDirectory);
+  command.add_option("--masks", options->masks, "Folder of instance images or masks to take that segment from");
   command.add_option("--sigma", options->sigma, "Standard deviation of the reading's noise")->capture_default_str();
   command.add_option("--stamp", options->stamp_s, "Time of the touch, seconds")->capture_default_str();
   command.add_option("--model", options->model, "material: the region is one material; mixture: each voxel its own")

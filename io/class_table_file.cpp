@@ -142,8 +142,15 @@ Table read_csv(const fs::path& path, const std::string& content) {
       continue;
     }
     ClassInfo info{*id, words[1], default_class_color(int(table.classes.size())), *id == 0 && means_no_class(words[1])};
-    if (words.size() >= 5)
-      if (const auto color = color_of({words[2], words[3], words[4]})) info.color = *color;
+    // Further columns that are no numbers are something else.
+    const auto is_number = [](const std::string& word) { return parse_number(word).has_value(); };
+    if (words.size() >= 5 && std::all_of(words.begin() + 2, words.begin() + 5, is_number)) {
+      if (const auto color = color_of({words[2], words[3], words[4]}))
+        info.color = *color;
+      else
+        table.problems.push_back(describe_mismatch(lines.where(), "color", "r, g, b from 0 to 255",
+                                                   "'" + words[2] + ", " + words[3] + ", " + words[4] + "'"));
+    }
     table.classes.push_back(info);
   }
   return table;

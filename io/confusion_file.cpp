@@ -16,12 +16,15 @@
 namespace felt {
 namespace {
 
-std::string trimmed(const std::string& text) {
-  const size_t first = text.find_first_not_of(" \t\r\""), last = text.find_last_not_of(" \t\r\"");
-  return first == std::string::npos ? "" : text.substr(first, last - first + 1);
-}
-
 std::string quoted(const std::string& text) { return std::string(1, '\'').append(text).append(1, '\''); }
+
+/// The first few names, and how many more there are.
+std::string list_of(const std::vector<std::string>& names) {
+  constexpr size_t kNamed = 3;
+  std::string text;
+  for (size_t i = 0; i < std::min(names.size(), kNamed); ++i) text.append(i == 0 ? "" : ", ").append(quoted(names[i]));
+  return names.size() > kNamed ? text + " and " + std::to_string(names.size() - kNamed) + " more" : text;
+}
 
 std::vector<std::string> split(const std::string& text, char separator) {
   std::vector<std::string> parts;
@@ -52,10 +55,15 @@ public:
 
   void columns(const std::vector<std::string>& names, const std::string& at) {
     for (const std::string& name : names) column_slot_.push_back(slot_of(name, at, "predicted class"));
-    for (int slot = 0; slot < classes_.size(); ++slot)
-      if (const auto times = std::count(column_slot_.begin(), column_slot_.end(), slot); times != 1)
-        problem(at, "column '" + classes_.at_slot(slot).name + "'", "it once",
+    std::vector<std::string> missing;
+    for (int slot = 0; slot < classes_.size(); ++slot) {
+      const auto times = std::count(column_slot_.begin(), column_slot_.end(), slot);
+      if (times == 0) missing.push_back(classes_.at_slot(slot).name);
+      if (times > 1)
+        problem(at, "column " + quoted(classes_.at_slot(slot).name), "it once",
                 "it " + std::to_string(times) + " times");
+    }
+    if (!missing.empty()) problem(at, "columns", "every class", "none for " + list_of(missing));
   }
 
   void row(const std::string& name, const std::vector<std::string>& cells, const std::string& at) {
@@ -78,9 +86,11 @@ public:
   }
 
   std::vector<double> take() {
+    std::vector<std::string> missing;
     for (int slot = 0; slot < classes_.size(); ++slot)
-      if (!has_row_[size_t(slot)]) problem(where_, "row '" + classes_.at_slot(slot).name + "'", "it once", "none");
-    if (!problems_.empty()) throw ConfigError(problems_);
+      if (!has_row_[size_t(slot)]) missing.push_back(classes_.at_slot(slot).name);
+    if (!missing.empty()) problem(where_, "rows", "every class", "none for " + list_of(missing));
+    if (!problems_.empty()) throw ConfigError(first_of(problems_));
     return std::move(counts_);
   }
 
@@ -101,12 +111,6 @@ private:
   std::vector<double> counts_;
   std::vector<std::string> problems_;
 };
-
-std::vector<std::string> trimmed_cells(const std::string& line) {
-  std::vector<std::string> cells = split(line, ',');
-  for (std::string& cell : cells) cell = trimmed(cell);
-  return cells;
-}
 
 std::vector<std::string> scalars(const YAML::Node& list) {
   std::vector<std::string> texts;
@@ -147,22 +151,21 @@ std::vector<double> parse_confusion_counts(const std::string& text, const ClassT
                                            const std::string& where) {
   Counts counts(classes, where);
   bool header = true;
-  const std::vector<std::string> lines = split(text, '\n');
-  for (size_t i = 0; i < lines.size(); ++i) {
-    if (trimmed(lines[i]).empty()) continue;
-    const std::string at = where + ":" + std::to_string(i + 1);
-    const std::vector<std::string> cells = trimmed_cells(lines[i]), values(cells.begin() + 1, cells.end());
+  char separator = ',';
+  for (LineReader lines(text, where); lines.next(false);) {
+    if (header) separator = csv_separator(lines.line());
+    const std::vector<std::string> cells = csv_cells(lines.line(), separator), values(cells.begin() + 1, cells.end());
     if (std::exchange(header, false))
-      counts.columns(values, at);
+      counts.columns(values, lines.where());
     else
-      counts.row(cells[0], values, at);
+      counts.row(cells[0], values, lines.where());
   }
   return counts.take();
 }
 
 std::vector<double> read_confusion_counts(const std::filesystem::path& file, const ClassTable& classes) {
   constexpr size_t kLargest = 64 << 20;  // 1000 classes with 17 digits each are 20 MB
-  const std::string text = read_whole_file(file, kLargest);
+  const std::string text = read_file_or_pipe(file, kLargest);
   const bool yaml = file.extension() == ".yaml" || file.extension() == ".yml";
   return yaml ? parse_yaml_counts(text, classes, file.string()) : parse_confusion_counts(text, classes, file.string());
 }

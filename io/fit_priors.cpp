@@ -3,43 +3,25 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "io/text_input.h"
 
 namespace felt {
-namespace {
-
-std::vector<std::string> cells_of(const std::string& line) {
-  std::vector<std::string> cells;
-  size_t start = 0;
-  while (true) {
-    const size_t comma = std::min(line.find(',', start), line.size());
-    std::string cell = line.substr(start, comma - start);
-    const size_t first = cell.find_first_not_of(" \t\r\""), last = cell.find_last_not_of(" \t\r\"");
-    cells.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
-    if (comma == line.size()) return cells;
-    start = comma + 1;
-  }
-}
-
-}  // namespace
-
 std::vector<ClassReadings> read_readings_csv(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  if (!stream) throw IoError(file.string() + ": cannot be opened");
+  const std::string content = read_file_or_pipe(file);
   std::vector<ClassReadings> classes;
   std::map<std::string, size_t> class_index;
   std::map<std::pair<size_t, std::string>, size_t> group_index;
   std::vector<std::string> header;
   size_t class_column = 0, value_column = 0, group_column = 0;
-  size_t number = 0;
-  for (std::string line; std::getline(stream, line);) {
-    const std::string where = file.string() + ":" + std::to_string(++number);
-    if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
-    const std::vector<std::string> cells = cells_of(line);
+  char separator = ',';
+  for (LineReader lines(content, file); lines.next();) {
+    const std::string where = lines.where();
+    if (header.empty()) separator = csv_separator(lines.line());
+    const std::vector<std::string> cells = csv_cells(lines.line(), separator);
     if (header.empty()) {
       header = cells;
       const auto column = [&](const char* name) {
@@ -49,8 +31,8 @@ std::vector<ClassReadings> read_readings_csv(const std::filesystem::path& file) 
       value_column = column("value");
       group_column = column("group");
       if (class_column == header.size() || value_column == header.size()) {
-        throw FormatError(
-            describe_mismatch(where, "header", "columns 'class', 'value' and perhaps 'group'", "'" + line + "'"));
+        throw FormatError(describe_mismatch(where, "header", "columns 'class', 'value' and perhaps 'group'",
+                                            "'" + std::string(lines.line().substr(0, 60)) + "'"));
       }
       continue;
     }

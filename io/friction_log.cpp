@@ -4,52 +4,34 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <limits>
-#include <map>
 #include <numbers>
-#include <sstream>
 #include <tuple>
 #include <utility>
 
 #include "core/error.h"
+#include "io/text_input.h"
 
 namespace felt {
 namespace {
 
-constexpr size_t kFewestSamples = 16, kMostProblems = 20;
-
-std::vector<std::string> cells_of(std::string line) {
-  std::erase_if(line, [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '"'; });
-  std::vector<std::string> cells;
-  std::istringstream stream(line);
-  for (std::string cell; std::getline(stream, cell, ',');) cells.push_back(cell);
-  return cells;
-}
-
-[[noreturn]] void fail(const std::vector<std::string>& problems) {
-  std::string all;
-  for (size_t i = 0; i < std::min(problems.size(), kMostProblems); ++i)
-    all.append(all.empty() ? "" : "\n").append(problems[i]);
-  throw FormatError(all);
-}
+constexpr size_t kFewestSamples = 16;
 
 /// Column of each of t, fx, fy, fz.
 std::vector<size_t> columns_of(const std::vector<std::string>& header, const std::string& where) {
   const std::vector<std::vector<std::string>> wanted{{"t", "time", "stamp"}, {"fx"}, {"fy"}, {"fz"}};
   std::vector<size_t> columns;
-  std::vector<std::string> problems;
+  std::string missing;
   for (const auto& names : wanted) {
     const auto at = std::find_if(header.begin(), header.end(), [&](const std::string& cell) {
       return std::find(names.begin(), names.end(), cell) != names.end();
     });
     if (at == header.end())
-      problems.push_back(describe_mismatch(where, "header", "a column " + names[0], "none"));
+      missing.append(missing.empty() ? "a column " : ", a column ").append(names[0]);
     else
       columns.push_back(size_t(at - header.begin()));
   }
-  if (!problems.empty()) fail(problems);
+  if (!missing.empty()) throw FormatError(describe_mismatch(where, "header", missing, "none"));
   return columns;
 }
 
@@ -118,16 +100,15 @@ ForceLog parse_force_log(const std::string& text, const std::string& where) {
   ForceLog log;
   std::vector<size_t> columns;
   std::vector<std::string> problems;
-  std::istringstream lines(text);
-  int number = 0;
-  for (std::string line; std::getline(lines, line);) {
-    const std::string at = where + ":" + std::to_string(++number);
-    const std::vector<std::string> cells = cells_of(line);
-    if (cells.empty() || cells[0].starts_with('#')) continue;
+  char separator = ',';
+  for (LineReader lines(text, where); lines.next();) {
+    const std::string at = lines.where();
     if (columns.empty()) {
-      columns = columns_of(cells, at);
+      separator = csv_separator(lines.line());
+      columns = columns_of(csv_cells(lines.line(), separator), at);
       continue;
     }
+    const std::vector<std::string> cells = csv_cells(lines.line(), separator);
     double values[4] = {};
     bool good = true;
     for (size_t i = 0; i < 4 && good; ++i) {
@@ -148,16 +129,12 @@ ForceLog parse_force_log(const std::string& text, const std::string& where) {
   if (problems.empty() && log.time_s.size() < kFewestSamples)
     problems.push_back(describe_mismatch(where, "samples", "at least " + std::to_string(kFewestSamples),
                                          std::to_string(log.time_s.size())));
-  if (!problems.empty()) fail(problems);
+  if (!problems.empty()) throw FormatError(first_of(problems));
   return log;
 }
 
 ForceLog read_force_log(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw IoError(describe_mismatch(file.string(), "force log", "a readable file", "none"));
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (stream.bad()) throw IoError(describe_mismatch(file.string(), "force log", "a readable file", "a read error"));
-  return parse_force_log(text, file.string());
+  return parse_force_log(read_file_or_pipe(file), file.string());
 }
 
 FrictionReading friction_reading(const ForceLog& log, const FrictionSettings& settings) {

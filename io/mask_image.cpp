@@ -4,11 +4,14 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "core/pose.h"
 #include "io/camera_file.h"
 #include "io/image_decode.h"
+#include "io/text_input.h"
 
 namespace felt {
 namespace {
@@ -56,26 +59,30 @@ ViewMask read_view_mask(const std::filesystem::path& file, const std::vector<dou
 }
 
 std::vector<Eigen::Vector3d> read_points(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  if (!stream) throw IoError(describe_mismatch(file.string(), "points", "a readable file", "none"));
+  const std::string content = read_file_or_pipe(file);
   std::vector<Eigen::Vector3d> points;
-  std::string problems;
-  int number = 0;
-  for (std::string line; std::getline(stream, line);) {
-    ++number;
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (line.empty() || line[0] == '#' || (points.empty() && line.rfind("x,y,z", 0) == 0)) continue;
+  std::vector<std::string> problems;
+  char separator = ',';
+  bool first = true;
+  for (LineReader lines(content, file); lines.next();) {
+    if (first) separator = csv_separator(lines.line());
+    const std::vector<std::string> cells = csv_cells(lines.line(), separator);
+    const bool header = std::exchange(first, false) && cells == std::vector<std::string>{"x", "y", "z"};
+    if (header) continue;
     Eigen::Vector3d p;
-    int used = 0;
-    if (std::sscanf(line.c_str(), "%lf ,%lf ,%lf %n", &p.x(), &p.y(), &p.z(), &used) == 3 &&
-        size_t(used) == line.size())
+    bool good = cells.size() == 3;
+    for (size_t i = 0; i < 3 && good; ++i) {
+      const std::optional<double> coordinate = parse_number(cells[i]);
+      good = coordinate.has_value();
+      if (good) p[Eigen::Index(i)] = *coordinate;
+    }
+    if (good)
       points.push_back(p);
     else
-      problems.append(problems.empty() ? "" : "\n")
-          .append(describe_mismatch(file.string() + ":" + std::to_string(number), "point", "x,y,z",
-                                    "'" + line.substr(0, 60) + "'"));
+      problems.push_back(
+          describe_mismatch(lines.where(), "point", "x,y,z", "'" + std::string(lines.line().substr(0, 60)) + "'"));
   }
-  if (!problems.empty()) throw FormatError(problems);
+  if (!problems.empty()) throw FormatError(first_of(problems));
   return points;
 }
 

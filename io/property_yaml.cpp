@@ -5,8 +5,6 @@
 #include <vector>
 
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <set>
 
 #include "core/error.h"
@@ -142,11 +140,7 @@ PropertyTable parse_properties(const std::string& text, const std::string& where
 }
 
 PropertyTable read_properties(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw IoError(describe_mismatch(file.string(), "properties", "a readable file", "none"));
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (stream.bad()) throw IoError(describe_mismatch(file.string(), "properties", "a readable file", "a read error"));
-  return parse_properties(text, file.string());
+  return parse_properties(read_file_or_pipe(file), file.string());
 }
 
 std::string properties_yaml(const PropertyTable& table) {

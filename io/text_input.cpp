@@ -1,5 +1,6 @@
 #include "io/text_input.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cstdio>
 #include <memory>
@@ -15,7 +16,8 @@ std::string read_whole_file(const fs::path& path, size_t limit_bytes) {
   const fs::file_status status = fs::status(path, fault);
   if (!fs::exists(status)) throw IoError(describe_mismatch(path.string(), "file", "a file", "nothing"));
   if (!fs::is_regular_file(status))
-    throw IoError(describe_mismatch(path.string(), "file", "a regular file", "a folder or device"));
+    throw IoError(describe_mismatch(path.string(), "file", "a regular file",
+                                    fs::is_directory(status) ? "a folder" : "a device or pipe"));
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
   if (!file) throw IoError(describe_mismatch(path.string(), "file", "a readable file", "no permission to open it"));
   const uintmax_t size = fs::file_size(path, fault);
@@ -25,6 +27,24 @@ std::string read_whole_file(const fs::path& path, size_t limit_bytes) {
                                         std::to_string(size)));
   std::string content(size, '\0');
   content.resize(std::fread(content.data(), 1, content.size(), file.get()));
+  if (std::ferror(file.get())) throw IoError(path.string() + ": reading failed");
+  return content;
+}
+
+std::string read_file_or_pipe(const fs::path& path, size_t limit_bytes) {
+  std::error_code fault;
+  const fs::file_status status = fs::status(path, fault);
+  if (!fs::is_fifo(status) && !fs::is_character_file(status)) return read_whole_file(path, limit_bytes);
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
+  if (!file) throw IoError(describe_mismatch(path.string(), "file", "a readable file", "no permission to open it"));
+  std::string content;
+  char part[1 << 16];
+  while (const size_t size = std::fread(part, 1, sizeof part, file.get())) {
+    if (size > limit_bytes - content.size())
+      throw FormatError(
+          describe_mismatch(path.string(), "size", "at most " + std::to_string(limit_bytes) + " bytes", "more"));
+    content.append(part, size);
+  }
   if (std::ferror(file.get())) throw IoError(path.string() + ": reading failed");
   return content;
 }
@@ -61,6 +81,28 @@ std::vector<std::string_view> split_words(std::string_view line, char separator)
     at = line.find_first_not_of(delimiters, end);
   }
   return words;
+}
+
+char csv_separator(std::string_view header) { return header.find(';') == std::string_view::npos ? ',' : ';'; }
+
+std::vector<std::string> csv_cells(std::string_view line, char separator) {
+  std::vector<std::string> cells;
+  for (size_t at = 0; at <= line.size();) {
+    const size_t end = std::min(line.find(separator, at), line.size());
+    const std::string_view cell = line.substr(at, end - at);
+    const size_t first = cell.find_first_not_of(" \t\r\""), last = cell.find_last_not_of(" \t\r\"");
+    cells.emplace_back(first == std::string_view::npos ? "" : cell.substr(first, last - first + 1));
+    at = end + 1;
+  }
+  return cells;
+}
+
+std::string first_of(const std::vector<std::string>& faults) {
+  if (faults.empty()) return "";
+  const size_t more = faults.size() - 1;
+  return faults.front() + (more == 0   ? ""
+                           : more == 1 ? " (and 1 more fault)"
+                                       : " (and " + std::to_string(more) + " more faults)");
 }
 
 std::optional<double> parse_number(std::string_view word) {

@@ -12,6 +12,8 @@ namespace felt {
 /// Whole content of a file. Throws IoError where it cannot be read or is no regular file, FormatError where it is
 /// larger than `limit_bytes`.
 std::string read_whole_file(const std::filesystem::path& path, size_t limit_bytes = size_t(1) << 30);
+/// The same for a file that a user names on the command line: a pipe will do, too (`/dev/stdin`, `<(...)` of a shell).
+std::string read_file_or_pipe(const std::filesystem::path& path, size_t limit_bytes = size_t(1) << 30);
 
 /// Throws ConfigError naming `where` unless the text is UTF-8, which names in a map must be.
 void require_utf8(std::string_view text, const std::string& where);
@@ -36,6 +38,14 @@ private:
 
 /// Words of a line separated by blanks, tabs or, where given, by one further character.
 std::vector<std::string_view> split_words(std::string_view line, char separator = ' ');
+
+/// What separates the cells of a CSV file with this header line: ';' where it has one, else ','.
+char csv_separator(std::string_view header);
+/// Cells of a line of a CSV file without the blanks and quotes around them; empty ones count.
+std::vector<std::string> csv_cells(std::string_view line, char separator);
+
+/// The faults of a data file on one line: the first, and how many more there are. Nothing where there are none.
+std::string first_of(const std::vector<std::string>& faults);
 
 /// A number with '.' as decimal sign; reads "nan", "inf" and "-inf" as such. Nothing where the word is anything else.
 std::optional<double> parse_number(std::string_view word);

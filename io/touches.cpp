@@ -4,27 +4,13 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <map>
-#include <sstream>
 #include <utility>
+
+#include "io/text_input.h"
 
 namespace felt {
 namespace {
-
-std::string trimmed(std::string text) {
-  const auto first = text.find_first_not_of(" \t\r\""), last = text.find_last_not_of(" \t\r\"");
-  return first == std::string::npos ? "" : text.substr(first, last - first + 1);
-}
-
-std::vector<std::string> cells_of(const std::string& line) {
-  std::vector<std::string> cells;
-  std::istringstream stream(line);
-  for (std::string cell; std::getline(stream, cell, ',');) cells.push_back(trimmed(cell));
-  if (!line.empty() && line.back() == ',') cells.emplace_back();
-  return cells;
-}
 
 template <typename T>
 std::optional<T> number(const std::string& text) {
@@ -41,13 +27,15 @@ public:
     for (size_t i = 0; i < names.size(); ++i)
       if (!at_.emplace(names[i], i).second)
         problems.push_back(describe_mismatch(where, "header", "each column once", "'" + names[i] + "' twice"));
+    std::string missing;
     const auto need = [&](bool good, const char* what) {
-      if (!good) problems.push_back(describe_mismatch(where, "header", what, "none"));
+      if (!good) missing.append(missing.empty() ? "" : ", ").append(what);
     };
     need(has("stamp") || has("frame"), "a column stamp or frame");
     need((has("x") && has("y") && has("z")) || (has("u") && has("v")), "columns x, y, z or u, v");
     need(has("property"), "a column property");
     need(has("value"), "a column value");
+    if (!missing.empty()) problems.push_back(describe_mismatch(where, "header", missing, "none"));
   }
   bool has(const std::string& name) const { return at_.contains(name); }
   size_t operator[](const std::string& name) const { return at_.at(name); }
@@ -163,36 +151,28 @@ std::vector<RecordedTouch> parse_touches(const std::string& text, const std::str
   std::vector<std::string> problems;
   std::vector<RecordedTouch> touches;
   std::optional<Columns> columns;
-  std::istringstream lines(text);
-  int number_of_line = 0;
-  for (std::string line; std::getline(lines, line);) {
-    ++number_of_line;
-    const std::string content = trimmed(line), at = where + ":" + std::to_string(number_of_line);
-    if (content.empty() || content[0] == '#') continue;
-    const std::vector<std::string> cells = cells_of(content);
+  char separator = ',';
+  for (LineReader lines(text, where); lines.next();) {
+    if (!columns) separator = csv_separator(lines.line());
+    const std::vector<std::string> cells = csv_cells(lines.line(), separator);
     if (!columns) {
-      columns.emplace(cells, at, problems);
+      columns.emplace(cells, lines.where(), problems);
       if (!problems.empty()) break;
     } else if (cells.size() != columns->size()) {
-      problems.push_back(describe_mismatch(at, "cells", std::to_string(columns->size()), std::to_string(cells.size())));
+      problems.push_back(
+          describe_mismatch(lines.where(), "cells", std::to_string(columns->size()), std::to_string(cells.size())));
     } else {
-      touches.push_back(parse_row(cells, *columns, at, problems));
-      touches.back().line = number_of_line;
+      touches.push_back(parse_row(cells, *columns, lines.where(), problems));
+      touches.back().line = int(lines.number());
     }
   }
   if (!columns) problems.push_back(describe_mismatch(where, "touches", "a header line", "an empty file"));
-  if (problems.empty()) return touches;
-  std::string all;
-  for (const std::string& problem : problems) all.append(all.empty() ? "" : "\n").append(problem);
-  throw FormatError(all);
+  if (!problems.empty()) throw FormatError(first_of(problems));
+  return touches;
 }
 
 std::vector<RecordedTouch> read_touches(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw IoError(describe_mismatch(file.string(), "touches", "a readable file", "none"));
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (stream.bad()) throw IoError(describe_mismatch(file.string(), "touches", "a readable file", "a read error"));
-  return parse_touches(text, file.string());
+  return parse_touches(read_file_or_pipe(file), file.string());
 }
 
 TouchedSequence touched_sequence(const SequenceReader& reader) {

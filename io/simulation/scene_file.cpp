@@ -3,14 +3,13 @@
 #include <yaml-cpp/yaml.h>
 
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
 
 #include "core/error.h"
 #include "io/simulation/furniture.h"
+#include "io/text_input.h"
 
 namespace felt {
 namespace {
@@ -181,14 +180,7 @@ const std::string& name_of(const ClassTable& classes, uint16_t id) {
 Scene parse_scene(const std::string& text, const std::string& where) { return SceneParser(where).parse(text); }
 
 Scene read_scene(const std::filesystem::path& file) {
-  constexpr std::uintmax_t kLargest = 16 << 20;
-  std::error_code fault;
-  const std::uintmax_t size = std::filesystem::file_size(file, fault);
-  std::ifstream in(file, std::ios::binary);
-  if (fault || !in) throw IoError(file.string() + ": cannot be opened for reading");
-  if (size > kLargest)
-    throw FormatError(describe_mismatch(file.string(), "size", "at most 16 MiB", std::to_string(size) + " bytes"));
-  return parse_scene({std::istreambuf_iterator<char>(in), {}}, file.string());
+  return parse_scene(read_file_or_pipe(file, 16 << 20), file.string());
 }
 
 std::string scene_json(const Scene& scene, const std::string& simulation) {

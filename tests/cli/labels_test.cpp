@@ -93,7 +93,7 @@ TEST_CASE("a network's confusions are learned and make its labels honest") {
   write_text(csv, "x,wall,floor\nwall,1,0\nfloor,0,1\n");
   const CommandResult refused = recording.reconstruct(labels + " --confusion " + quoted(csv));
   CHECK(refused.exit_code == 3);
-  CHECK_THAT(refused.err, Contains("column 'sofa'"));
+  CHECK_THAT(refused.err, Contains("columns: expected every class, found none for 'sofa'"));
 }
 
 TEST_CASE("label settings come from the command line or the file, are checked, and are kept with the map") {
@@ -219,6 +219,11 @@ TEST_CASE("a class table that cannot be used ends with every fault and exit code
   CHECK(refused.exit_code == 3);
   for (const char* part : {"id 1", "name 'wall'", "t.yaml:3: prior", "t.yaml:5: id", "t.yaml:6: name"})
     CHECK_THAT(refused.err, Contains(part));
+  const fs::path csv = recording.folder.path() / "t.csv";
+  write_text(csv, "id,name,r,g,b\n1,wall,0,0,255\n2,floor,0,256,0\n");
+  const CommandResult color = recording.reconstruct("--classes " + quoted(csv));
+  CHECK(color.exit_code == 3);
+  CHECK_THAT(color.err, Contains("t.csv:3: color: expected r, g, b from 0 to 255, found '0, 256, 0'"));
 }
 
 }  // namespace felt::test

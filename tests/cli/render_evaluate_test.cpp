@@ -54,7 +54,66 @@ TEST_CASE("render names what it cannot use") {
   CHECK(both.exit_code == 3);
   CHECK_THAT(both.err, Contains("--intrinsics") && Contains("--size"));
   CHECK(run_feltmap("render " + (folder.path() / "absent.vdb").string() + " --pose 0,0,0,0,0,0,1 --out x").exit_code ==
-        2);
+        4);
+}
+
+TEST_CASE("images are listed with commas or blanks, before or after the map") {
+  const TemporaryDirectory folder;
+  const std::string map = wall_map(folder).string(), out = (folder.path() / "views").string();
+  const std::string view = " --pose 0,0,0,0,0,0,1 --intrinsics 60,60,15.5,11.5 --size 32x24 --json --out " + out;
+  const nlohmann::json names = {"000000.depth.png", "000000.normal.png"};
+  for (const std::string& words : {map + " --images depth,normal", map + " --images depth normal",
+                                   "--images depth normal " + map, "--images depth,normal " + map}) {
+    const CommandResult result = run_feltmap("render " + words + view);
+    INFO(words << ": " << result.err);
+    REQUIRE(result.exit_code == 0);
+    CHECK(nlohmann::json::parse(result.out)["views"][0] == names);
+  }
+  const CommandResult unknown = run_feltmap("render " + map + " --images depth heat" + view);
+  CHECK(unknown.exit_code == 3);
+  CHECK_THAT(unknown.err, Contains("found 'heat'"));
+  CHECK(run_feltmap("render " + map + " depth" + view).exit_code == 2);
+}
+
+TEST_CASE("a file that is not there, or is a folder, ends with exit code 4 and one line that names it") {
+  const TemporaryDirectory folder;
+  const std::string map = wall_map(folder).string(), absent = (folder.path() / "absent").string();
+  const std::string scene = (source_dir() / "data" / "scenes" / "table_wall").string(), dir = folder.path().string();
+  for (const auto& [arguments, named] : std::vector<std::pair<std::string, std::string>>{
+           {"evaluate " + absent + ".vdb --reference-mesh x.ply", absent},
+           {"evaluate " + map + " --reference-mesh " + absent + ".ply", absent},
+           {"evaluate " + map + " --reference-labels " + absent, absent},
+           {"evaluate " + map + " --reference-readings " + absent, absent},
+           {"evaluate " + map + " --reference-mesh x.ply --trajectory " + absent, absent},
+           {"render " + map + " --out x --trajectory " + absent, absent},
+           {"reconstruct " + scene + " --out " + absent + ".out --confusion " + absent, absent},
+           {"touch " + map + " --sequence " + scene + " --frame 0 --pixel 9,9 --property friction --value 1 --masks " +
+                absent,
+            absent},
+           {"friction " + dir, dir},
+           {"query " + map + " --file " + dir, dir},
+           {"infer --fit-priors " + dir, dir},
+           {"evaluate " + map + " --reference-readings " + dir, dir}}) {
+    const CommandResult result = run_feltmap(arguments);
+    INFO(arguments << ": " << result.err);
+    CHECK(result.exit_code == 4);
+    CHECK_THAT(result.err, Contains(named));
+    CHECK(std::count(result.err.begin(), result.err.end(), '\n') == 1);
+  }
+}
+
+TEST_CASE("numbers that cannot be meant are refused without a number of 300 digits") {
+  const TemporaryDirectory folder;
+  const std::string map = wall_map(folder).string();
+  const auto refused = [&](const std::string& arguments, const std::string& reason) {
+    const CommandResult result = run_feltmap(arguments);
+    CHECK(result.exit_code == 2);
+    CHECK_THAT(result.err, Contains(reason));
+  };
+  refused("evaluate " + map + " --reference-mesh x.ply --threshold 0",
+          "--threshold: expected a finite number above 0, found '0'");
+  refused("diff " + map + " " + map + " --tol=-1", "--tol: expected a finite number from 0, found '-1'");
+  refused("query " + map + " --at 0,0,1 --below nan", "--below: expected a finite number, found 'nan'");
 }
 
 TEST_CASE("evaluate measures a known distance and defines every figure") {

@@ -33,4 +33,12 @@ TEST_CASE("a command line that makes no sense exits with 2 and one line on stder
   }
 }
 
+TEST_CASE("an unknown command is named beside those there are") {
+  const CommandResult result = run_feltmap("frobnicate --json");
+  CHECK(result.exit_code == 2);
+  CHECK_THAT(result.err, Catch::Matchers::StartsWith("feltmap: error: 'frobnicate': expected one of reconstruct, ") &&
+                             Catch::Matchers::EndsWith(" (see feltmap --help)\n"));
+  CHECK_THAT(result.err, Catch::Matchers::Contains("friction"));
+}
+
 }  // namespace felt::test

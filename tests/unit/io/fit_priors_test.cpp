@@ -28,6 +28,14 @@ TEST_CASE("readings are sorted into classes and groups, whatever the order of th
   CHECK(classes[1].groups == GroupedReadings{{0.4}});
 }
 
+TEST_CASE("readings of a spreadsheet are read: a byte order mark and semicolons") {
+  const auto classes = read(
+      "\xef\xbb\xbf"
+      "class;value\r\nice;0.1\r\n");
+  REQUIRE(classes.size() == 1);
+  CHECK(classes[0].groups == GroupedReadings{{0.1}});
+}
+
 TEST_CASE("a row that cannot be used is named by its line") {
   using Catch::Matchers::Contains;
   CHECK_THROWS_WITH(read("class,value\nice,fast\n"), Contains(":2: value"));

@@ -1,10 +1,12 @@
 #include "io/touches.h"
 
 #include <catch2/catch.hpp>
+#include <fstream>
 #include <optional>
 #include <string>
 
 #include "io/map_file.h"
+#include "io/mask_image.h"
 #include "io/property_yaml.h"
 #include "io/touch_json.h"
 #include "tests/support/data.h"
@@ -37,9 +39,37 @@ TEST_CASE("recorded touches are read by column name") {
   CHECK(touches[1].sigma == 0.05);
 }
 
-TEST_CASE("every problem of a touch file is named with its line") {
+TEST_CASE("touch files of spreadsheets are read: a byte order mark, semicolons, Windows line ends") {
+  const auto touches = parse_touches("\xef\xbb\xbfstamp;x;y;z;property;value\r\n1;2;3;4;\"friction\";0.3\r\n", "t.csv");
+  REQUIRE(touches.size() == 1);
+  CHECK(touches[0].line == 2);
+  CHECK(touches[0].stamp_s == 1);
+  CHECK(*touches[0].point_m == Eigen::Vector3d(2, 3, 4));
+  CHECK(touches[0].property == "friction");
+  CHECK_THROWS_WITH(parse_touches("stamp;x;y;z;property;value\n1;2;3;4;friction;0,3\n", "t.csv"),
+                    "t.csv:2: value: expected a number, found '0,3'");
+}
+
+TEST_CASE("points are read with or without a header, by commas or semicolons, after a byte order mark") {
+  const TemporaryDirectory folder;
+  const auto file = folder.path() / "points.csv";
+  const auto read = [&](const std::string& text) {
+    std::ofstream(file, std::ios::binary) << text;
+    return read_points(file);
+  };
+  const std::vector<Eigen::Vector3d> expected = {{1, -2, 0.5}, {3, 4, 5}};
+  CHECK(read("1,-2,0.5\n3 , 4 , 5\n") == expected);
+  CHECK(read("\xef\xbb\xbfx,y,z\r\n1,-2,0.5\r\n\r\n# end\r\n3,4,5") == expected);
+  CHECK(read("\xef\xbb\xbf"
+             "1;-2;0.5\n3;4;5\n") == expected);
+  CHECK_THROWS_WITH(read("1,2\n1,2,3,4\nx,y,z\n"),
+                    file.string() + ":1: point: expected x,y,z, found '1,2' (and 2 more faults)");
+  CHECK_THROWS_WITH(read_points(folder.path()), Catch::Contains("found a folder"));
+}
+
+TEST_CASE("the first fault of a touch file is named with its line, and how many more there are") {
   CHECK_THROWS_WITH(parse_touches("stamp,x,y,z,property,value\n1,2,3,zz,friction,0.3\n1,2\n", "t.csv"),
-                    Catch::Contains("t.csv:2: z: expected a number, found 'zz'") && Catch::Contains("t.csv:3: cells"));
+                    "t.csv:2: z: expected a number, found 'zz' (and 1 more fault)");
   CHECK_THROWS_WITH(parse_touches("x,y,z\n", "t.csv"), Catch::Contains("stamp or frame") && Catch::Contains("value"));
   CHECK_THROWS_WITH(parse_touches("", "t.csv"), Catch::Contains("empty file"));
   CHECK_THROWS_AS(read_touches("/does/not/exist.csv"), IoError);

@@ -1,0 +1,36 @@
+#include "apps/number_checks.h"
+
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "io/text_input.h"
+
+namespace felt::apps {
+namespace {
+
+template <typename Good>
+CLI::Validator number_check(const std::string& expected, const char* shown_in_help, Good good) {
+  return {[expected, good](std::string& text) {
+            const std::optional<double> value = parse_number(text);
+            if (value && std::isfinite(*value) && good(*value)) return std::string();
+            return "expected " + expected + ", found '" + text + "'";
+          },
+          shown_in_help};
+}
+
+}  // namespace
+
+CLI::Validator above_zero() {
+  return number_check("a finite number above 0", "ABOVE 0", [](double value) { return value > 0; });
+}
+
+CLI::Validator at_least_zero() {
+  return number_check("a finite number from 0", "FROM 0", [](double value) { return value >= 0; });
+}
+
+CLI::Validator finite() {
+  return number_check("a finite number", "", [](double) { return true; });
+}
+
+}  // namespace felt::apps
