@@ -79,6 +79,8 @@ openvdb::MetaMap read_meta_map(Bytes& in) {
   openvdb::MetaMap metadata;
   for (auto left = in.value<uint32_t>("number of metadata entries"); left > 0; --left) {
     const std::string name = in.text("name of a metadata entry"), type = in.text("type of a metadata entry");
+    if (name.empty()) in.fail("metadata entry", "a name", "none");
+    if (metadata[name] != nullptr) in.fail("metadata entry", "each name once", "'" + name + "' twice");
     const auto size = in.value<uint32_t>("size of a metadata entry");
     const char* bytes = in.take(size, "metadata entry");
     if (type == "string") {
