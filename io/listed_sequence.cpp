@@ -81,8 +81,11 @@ private:
   template <typename Stored>
   DepthImage metres_of(const Image<Stored>& stored, const ImageSource& source) const;
   ColorImage read_color(const ImageSource& source, const DepthImage& depth_m) const;
-  Image<uint16_t> read_ids(const ImageSource& source, const std::string& kind, const DepthImage& depth_m) const;
-  LabelImage read_labels(const ImageSource& source, const DepthImage& depth_m) const;
+  /// Ids on the depth grid. An image of another size than depth's must have that of the colour image, where one is
+  /// named, else only its shape.
+  Image<uint16_t> read_ids(const ImageSource& source, const std::string& kind, const DepthImage& depth_m,
+                           const ImageSource* color) const;
+  LabelImage read_labels(const FrameRecord& frame, const DepthImage& depth_m) const;
   Image<uint16_t> read_masks(const std::vector<ImageSource>& masks, const DepthImage& depth_m) const;
   Image<uint16_t> read_probability_planes(const ImageSource& source, float& scale) const;
   ProbabilityImage read_probabilities(const ImageSource& source, const LabelImage& labels) const;
@@ -185,9 +188,9 @@ ReadResult ListedSequence::read(int64_t i) const {
     frame.T_world_camera = read_pose(record);
     frame.depth_m = read_depth(record.depth);
     if (with_color_) frame.color = read_color(record.color, frame.depth_m);
-    if (!record.labels.empty()) frame.labels = read_labels(record.labels, frame.depth_m);
+    if (!record.labels.empty()) frame.labels = read_labels(record, frame.depth_m);
     if (with_instances_ && !record.instances.empty())
-      frame.instances = read_ids(record.instances, "instance", frame.depth_m);
+      frame.instances = read_ids(record.instances, "instance", frame.depth_m, &record.color);
     if (with_instances_ && !record.masks.empty()) frame.instances = read_masks(record.masks, frame.depth_m);
     if (!record.probabilities.empty())
       frame.probabilities = read_probabilities(record.probabilities, frame.labels);
@@ -273,25 +276,32 @@ ColorImage ListedSequence::read_color(const ImageSource& source, const DepthImag
                              listing_.T_color_depth, outside, color_distortion());
 }
 
-Image<uint16_t> ListedSequence::read_ids(const ImageSource& source, const std::string& kind,
-                                         const DepthImage& depth_m) const {
+Image<uint16_t> ListedSequence::read_ids(const ImageSource& source, const std::string& kind, const DepthImage& depth_m,
+                                         const ImageSource* color) const {
   Image<uint16_t> image = decoded(source, kind, decode_gray16);
   if (image.width() == info_.camera.width && image.height() == info_.camera.height) {
     if (!undistortion_.empty()) image = undistorted(image, undistortion_, kNoLabel);
     return image;
   }
-  // Networks label the colour image: another size is right where it has the colour image's shape.
-  const double shape = double(image.width()) * info_.camera.height / (double(image.height()) * info_.camera.width);
-  if (!listing_.color_intrinsics && std::abs(shape - 1) > 0.02)
+  std::string expected = size_text(info_.camera.width, info_.camera.height);
+  bool fits = false;
+  if (color == nullptr) {
+    const double shape = double(image.width()) * info_.camera.height / (double(image.height()) * info_.camera.width);
+    fits = listing_.color_intrinsics || std::abs(shape - 1) <= 0.02;
+  } else if (!color->empty()) {  // networks label the colour image
+    const ImageHeader header = decoded(*color, "colour", read_image_header);
+    fits = image.width() == header.width && image.height() == header.height;
+    expected += ", or the colour image's " + size_text(header.width, header.height);
+  }
+  if (!fits)
     throw Skip{"wrong-size " + kind + " image",
-               describe_mismatch(source.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
-                                 size_text(image.width(), image.height()))};
+               describe_mismatch(source.path.string(), "size", expected, size_text(image.width(), image.height()))};
   return registered_to_depth<uint16_t>(image, camera_of_color_grid(image.width(), image.height()), depth_m,
                                        info_.camera, listing_.T_color_depth, kNoLabel, color_distortion());
 }
 
-LabelImage ListedSequence::read_labels(const ImageSource& source, const DepthImage& depth_m) const {
-  LabelImage labels = read_ids(source, "label", depth_m);
+LabelImage ListedSequence::read_labels(const FrameRecord& frame, const DepthImage& depth_m) const {
+  LabelImage labels = read_ids(frame.labels, "label", depth_m, &frame.color);
   for (uint16_t& id : labels) {
     if (label_offset_ == 0) break;
     const int moved = id + label_offset_;
@@ -310,7 +320,7 @@ Image<uint16_t> ListedSequence::read_masks(const std::vector<ImageSource>& masks
   std::vector<Mask> all;
   for (const ImageSource& source : masks) {
     if (all.size() + 1 == kNoLabel) throw Skip{"too many masks", source.path.parent_path().string()};
-    Mask mask{read_ids(source, "mask", depth_m), 1, uint16_t(all.size() + 1), 0};
+    Mask mask{read_ids(source, "mask", depth_m, nullptr), 1, uint16_t(all.size() + 1), 0};
     for (uint16_t& value : mask.image)
       if (value == kNoLabel) value = 0;  // outside the labelled image
     mask.least = uint16_t(std::max(1, (*std::max_element(mask.image.begin(), mask.image.end()) + 1) / 2));

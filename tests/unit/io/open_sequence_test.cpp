@@ -106,13 +106,15 @@ TEST_CASE("labels and classes come with the sequence or from the folders the use
                     Catch::Contains("none of them of a frame"));
 }
 
-TEST_CASE("labels of another image size are brought to the depth grid where they show the same view") {
+TEST_CASE("labels of the colour image's size are brought to the depth grid, those of another are refused") {
   TemporaryDirectory folder;
   write_generic(folder.path(), 1);
   Image<uint8_t> twice(2 * kWidth, 2 * kHeight);
   for (int v = 0; v < 2 * kHeight; ++v)
     for (int u = 0; u < 2 * kWidth; ++u) twice(u, v) = uint8_t(1 + (u / 2) % 3);
   write_bytes(folder.path() / "labels" / "0.png", encode_png(twice));
+  CHECK(skip_of(*open_sequence(folder.path()), 0).reason == "wrong-size label image");
+  write_bytes(folder.path() / "color" / "0.png", encode_png(ColorImage(2 * kWidth, 2 * kHeight)));
   CHECK(frame_of(*open_sequence(folder.path()), 0).labels == label_image());
   write_bytes(folder.path() / "labels" / "0.png", encode_png(Image<uint8_t>(kHeight, kWidth, 1)));
   CHECK(skip_of(*open_sequence(folder.path()), 0).reason == "wrong-size label image");
