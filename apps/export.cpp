@@ -127,6 +127,8 @@ int run(const ExportOptions& o) {
   Map map = load_map(o.map);
   use_properties(map, o.properties);
   const std::optional<Region> part = part_of_map(map, o);
+  if (part && part->voxels() == 0)
+    throw ConfigError(describe_mismatch(o.map.string(), "part to export", "at least one voxel of the map", "none"));
   json written = json::object();
   if (!o.vdb.empty()) written["vdb"] = write_vdb(map, part ? &*part : nullptr, o);
   if (!o.mesh.empty() || !o.points.empty() || !o.html.empty())

@@ -279,6 +279,9 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   const std::string json = document.dump(2) + "\n";
   write_file_atomically(options.out / kReportName, json);
 
+  if (report.mesh_triangles == 0)
+    spdlog::warn("the map holds no surface: is there depth between {} and {} m, and are voxels of {} m small enough?",
+                 options.fusion.min_depth_m, options.fusion.max_depth_m, options.voxel_size_m);
   if (common.json) {
     std::fputs(json.c_str(), stdout);
   } else if (!common.quiet) {

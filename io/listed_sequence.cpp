@@ -372,7 +372,7 @@ ProbabilityImage ListedSequence::read_probabilities(const ImageSource& source, c
                                  std::to_string(width) + " x 2 m " + std::to_string(height) + " for the m best, or " +
                                      size_text(width, height) + " for the confidence of label images",
                                  size_text(stack.width(), stack.height()))};
-  return probabilities_of_stack(stack, height);
+  return probabilities_of_stack(stack, height, scale);
 }
 
 ProbabilityImage ListedSequence::read_class_maps(const FrameRecord& frame) const {

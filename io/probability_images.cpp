@@ -89,7 +89,7 @@ void attach_probabilities(const fs::path& folder, SequenceListing& listing) {
   attach_images(folder, listing, &FrameRecord::probabilities, "probabilities");
 }
 
-ProbabilityImage probabilities_of_stack(const Image<uint16_t>& stack, int height) {
+ProbabilityImage probabilities_of_stack(const Image<uint16_t>& stack, int height, float full_scale) {
   const int width = stack.width(), top = stack.height() / (2 * height);
   ProbabilityImage image{width, height, top, {}, {}};
   const size_t pixels = size_t(width) * size_t(height), m_planes = size_t(top);
@@ -98,7 +98,7 @@ ProbabilityImage probabilities_of_stack(const Image<uint16_t>& stack, int height
   for (size_t m = 0; m < m_planes; ++m)
     for (size_t p = 0; p < pixels; ++p) {
       image.class_id[p * m_planes + m] = stack.data()[m * pixels + p];
-      image.probability[p * m_planes + m] = float(stack.data()[(m_planes + m) * pixels + p]) / 65535.0f;
+      image.probability[p * m_planes + m] = float(stack.data()[(m_planes + m) * pixels + p]) / full_scale;
     }
   return image;
 }

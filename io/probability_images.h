@@ -11,8 +11,9 @@ namespace felt {
 
 /// Gives each frame the class probabilities that `folder` holds for it. Three ways to store them are told apart:
 ///
-/// * one image a frame, named like the label images of `attach_labels`: a 16-bit PNG as wide as the depth image and 2 m
-///   times as high, m planes of class ids, the most probable first, over m planes of their probabilities times 65535;
+/// * one image a frame, named like the label images of `attach_labels`: a PNG as wide as the depth image and 2 m times
+///   as high, m planes of class ids, the most probable first, over m planes of their probabilities times 65535 (16
+///   bits) or 255 (8 bits);
 ///   or, beside label images, an 8- or 16-bit PNG of the depth image's size: how sure the label is, of 255 or 65535;
 /// * one image a class and frame, `frame-000012.CLASS.png` or `frame-000012.CLASS.mask.png` with a class of
 ///   `listing.classes`: its probability times 255 or 65535;
@@ -22,8 +23,9 @@ namespace felt {
 /// Throws IoError where the folder cannot be read and FormatError where nothing in it belongs to any frame.
 void attach_probabilities(const std::filesystem::path& folder, SequenceListing& listing);
 
-/// A stack of m planes of ids over m of probabilities times 65535. Its height must be a multiple of 2 * `height`.
-ProbabilityImage probabilities_of_stack(const Image<uint16_t>& stack, int height);
+/// A stack of m planes of ids over m of probabilities times `full_scale`. Its height must be a multiple of 2 *
+/// `height`.
+ProbabilityImage probabilities_of_stack(const Image<uint16_t>& stack, int height, float full_scale);
 
 /// The label with its confidence; images of one size.
 ProbabilityImage probabilities_of_confidence(const LabelImage& labels, const Image<uint16_t>& confidence,

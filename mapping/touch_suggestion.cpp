@@ -120,8 +120,12 @@ std::vector<Region> segments(const Map& map, const RegionSettings& settings, siz
 std::vector<Suggestion> suggest_touches(const Map& map, const std::string& property,
                                         const SuggestionSettings& settings) {
   const auto index = map.properties.index_of(property);
-  if (!index)
-    throw TouchError(describe_mismatch("suggest", "property", "one of the map's properties", "'" + property + "'"));
+  if (!index) {
+    std::string names;
+    for (const Property& p : map.properties.properties()) names += (names.empty() ? "" : ", ") + p.name;
+    throw TouchError(describe_mismatch(
+        "suggest", "property", names.empty() ? "a map with properties" : "one of " + names, "'" + property + "'"));
+  }
   if (!class_priors(map.properties[*index], map.classes).any())
     throw TouchError(
         describe_mismatch("suggest", "priors of '" + property + "'", "one for a class of the map", "none"));

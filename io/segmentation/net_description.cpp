@@ -15,7 +15,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr size_t kLimitBytes = 1 << 20;
-constexpr int kMostPixelsAcross = 8192;
 
 /// Reads the keys of one YAML table and gathers what is wrong with them.
 class Reader : public YamlProblems {

@@ -18,6 +18,9 @@ enum class NetBackend { automatic, opencv, onnxruntime };
 /// numbers.
 enum class NetOutput { probabilities, logits, labels };
 
+/// Largest width or height of a network's input.
+inline constexpr int kMostPixelsAcross = 8192;
+
 /// A segmentation network as `net.yaml` describes it (docs/perception.md).
 struct NetDescription {
   std::filesystem::path described_in;  ///< for messages

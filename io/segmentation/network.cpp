@@ -35,6 +35,10 @@ void check_input(const OnnxValue& input, NetDescription& net, const std::string&
         net.width == 0 ? "height, width" : std::to_string(net.height) + ", " + std::to_string(net.width);
     problems.push_back(
         describe_mismatch(where, "input " + input.name, "shape [1, 3, " + size + "]", describe({input})));
+  } else if (std::max(input.shape[2], input.shape[3]) > kMostPixelsAcross) {
+    problems.push_back(describe_mismatch(where, "input " + input.name,
+                                         "at most " + std::to_string(kMostPixelsAcross) + " pixels across",
+                                         describe({input})));
   } else if (net.width == 0 && input.shape[2] > 0 && input.shape[3] > 0) {
     net.height = int(input.shape[2]), net.width = int(input.shape[3]);
   }

@@ -268,6 +268,12 @@ TEST_CASE("a class, a box and a segment cut the surface and the grids where they
   const auto [both_least, both_greatest] = extent("--segment-at 0.2,0,0 --box 0.1,-0.2,-0.05,0.2,0.2,0.05");
   CHECK(both_least == Approx(0.1).margin(0.03));
   CHECK(both_greatest == Approx(0.2).margin(0.03));
+  fs::remove(ply);
+  const CommandResult nothing =
+      run_feltmap("export " + quoted(floor.map) + " --mesh " + quoted(ply) + " --box 9,9,9,10,10,10");
+  CHECK(nothing.exit_code == 3);
+  CHECK_THAT(nothing.err, Contains("at least one voxel"));
+  CHECK_FALSE(fs::exists(ply));
   const CommandResult missed =
       run_feltmap("export --force " + quoted(floor.map) + " --mesh " + quoted(ply) + " --segment-at 5,5,5");
   CHECK(missed.exit_code != 0);

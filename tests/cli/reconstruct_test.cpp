@@ -243,6 +243,15 @@ TEST_CASE("a sequence without one usable frame writes nothing and says why") {
   CHECK_FALSE(fs::exists(folder.path() / "out/map.vdb"));
 }
 
+TEST_CASE("a map without a surface is said to be one") {
+  const TemporaryDirectory folder;
+  const CommandResult coarse = reconstruct(boxes(), folder.path() / "coarse", "--voxel-size 50");
+  CHECK(coarse.exit_code == 0);
+  CHECK_THAT(coarse.err, Catch::Matchers::Contains("no surface") && Catch::Matchers::Contains("voxels of 50 m"));
+  const CommandResult fine = reconstruct(boxes(), folder.path() / "fine", "");
+  CHECK_THAT(fine.err, !Catch::Matchers::Contains("no surface"));
+}
+
 TEST_CASE("info describes a map and a sequence") {
   const TemporaryDirectory out;
   const CommandResult made = reconstruct(boxes(), out.path(), "--json");

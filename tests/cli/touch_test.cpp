@@ -163,6 +163,7 @@ TEST_CASE("the region command shows what a touch would update and writes it as a
 TEST_CASE("a touch is suggested where it teaches most") {
   const TemporaryDirectory folder;
   const std::string map = save_floor(folder);
+  CHECK_THAT(run_feltmap("suggest " + map + " --property stickiness").err, Catch::Contains("expected one of friction"));
   const json before = ask("suggest " + map + " --property friction")["suggestions"];
   REQUIRE(before.size() == 2);
   CHECK(before[0]["score"].get<double>() >= before[1]["score"].get<double>());

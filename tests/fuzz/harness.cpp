@@ -26,6 +26,7 @@
 #include "io/pose_list.h"
 #include "io/property_yaml.h"
 #include "io/reconstruct_config.h"
+#include "io/segmentation/network.h"
 #include "io/simulation/scene_file.h"
 #include "io/touch_json.h"
 #include "io/touches.h"
@@ -164,6 +165,30 @@ void read_redwood_log(const std::string& bytes) {
 
 void read_scan(const std::string& bytes) { read_frames_of(as_file("scan.bin", bytes), "lidar"); }
 
+/// One scan that has a pose.
+void read_kitti_calibration(const std::string& bytes) {
+  fs::create_directories(scratch_folder() / "kitti");
+  as_file("kitti/000000.bin", std::string(16, '\0'));
+  as_file("kitti/poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  as_file("kitti/calib.txt", bytes);
+  open_sequence(scratch_folder() / "kitti", {});
+}
+
+void read_net(const std::string& bytes) {
+  as_file("net.onnx", "");
+  read_net_description(as_file("net.yaml", bytes));
+}
+
+/// Edges of the graph and whether they fit a description; what runs a network is another library.
+void read_onnx(const std::string& bytes) {
+  NetDescription net;
+  net.file = as_file("net.onnx", bytes);
+  net.described_in = "net.yaml";
+  net.backend = NetBackend::opencv;
+  net.classes = {"wood", "ice"};
+  load_net_model(net);
+}
+
 /// One view of 8 x 6 pixels; the bytes are the poses beside it.
 void read_scenenet(const std::string& bytes) {
   const fs::path folder = scratch_folder() / "scenenet" / "0" / "7";
@@ -219,8 +244,11 @@ constexpr Harness kHarnesses[] = {
     {"friction", read_friction, kFree, kText},
     {"image", read_image, kFree, kImage},
     {"infer", read_infer, kFree, kText},
+    {"kitti_calibration", read_kitti_calibration, kFree, kText},
     {"map", read_map, kMapFree, kMap},
+    {"net", read_net, kFree, kText},
     {"obj", read_obj, kFree, kText},
+    {"onnx", read_onnx, kFree, kText},
     {"ply", read_ply, kFree, kText},
     {"points", read_point_list, kFree, kText},
     {"poses", read_poses_text, kFree, kText},

@@ -68,6 +68,22 @@ TEST_CASE("confidences beside label images become the probability of the label")
   CHECK(recording.probabilities().probability[1] == Approx(0.2));
 }
 
+TEST_CASE("probabilities of a stack are out of what its bits can hold") {
+  Recording recording;
+  recording.options.probs_dir = recording.side;
+  const auto written = [&](auto stack, int full) {  // class 2 with one fifth
+    for (int v = 0; v < 2 * kHeight; ++v)
+      for (int u = 0; u < kWidth; ++u)
+        stack(u, v) = static_cast<std::decay_t<decltype(stack(0, 0))>>(v < kHeight ? 2 : full / 5);
+    write_bytes(recording.side / "0.png", encode_png(stack));
+    const ProbabilityImage image = recording.probabilities();
+    REQUIRE(image.top == 1);
+    return of_class(image, 5, 2);
+  };
+  CHECK(written(Image<uint16_t>(kWidth, 2 * kHeight), 65535) == Approx(0.2));
+  CHECK(written(Image<uint8_t>(kWidth, 2 * kHeight), 255) == Approx(0.2));
+}
+
 TEST_CASE("images of single classes are found by the names of the table, whatever their numbers") {
   Recording recording;
   recording.options.probs_dir = recording.side;

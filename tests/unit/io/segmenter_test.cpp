@@ -286,6 +286,14 @@ TEST_CASE("a number of classes or a size that is not the model's is an error tha
   CHECK_THAT(fault_of<ConfigError>(description), Contains("[1, 3, 64, 64]") && Contains("image [1, 3, 16, 32]"));
 }
 
+TEST_CASE("an input larger than any picture is refused before memory is taken for it", "[segmentation]") {
+  const TemporaryDirectory folder;
+  TestNet net = nearest_color_net(kPrototypes);
+  net.width = 1 << 30, net.height = 8;
+  CHECK_THROWS_WITH(Segmenter(read_net_description(write_net(folder.path(), net, kNames)), {}),
+                    Contains("at most 8192 pixels") && Contains("1073741824"));
+}
+
 TEST_CASE("an output that is not finite, or no probability, is an error that names model and frame", "[segmentation]") {
   const TemporaryDirectory folder;
   TestNet net = nearest_color_net(kPrototypes);
