@@ -124,14 +124,10 @@ Table read_csv(const fs::path& path, const std::string& content) {
   Table table;
   LineReader lines(content, path);
   bool first = true;
+  char separator = ',';
   while (lines.next()) {
-    const char separator = lines.line().find(';') != std::string_view::npos ? ';' : ',';
-    std::vector<std::string> words;
-    for (size_t at = 0; at <= lines.line().size();) {
-      const size_t end = std::min(lines.line().find(separator, at), lines.line().size());
-      words.emplace_back(lines.line().substr(at, end - at));
-      at = end + 1;
-    }
+    if (first) separator = csv_separator(lines.line());
+    const std::vector<std::string> words = csv_cells(lines.line(), separator);
     const auto id = id_of(words[0]);
     const bool header = first && !id;
     first = false;

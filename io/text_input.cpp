@@ -83,16 +83,33 @@ std::vector<std::string_view> split_words(std::string_view line, char separator)
   return words;
 }
 
-char csv_separator(std::string_view header) { return header.find(';') == std::string_view::npos ? ',' : ';'; }
+char csv_separator(std::string_view header) {
+  bool quoted = false;
+  for (const char c : header) {
+    if (c == '"') quoted = !quoted;
+    if (c == ';' && !quoted) return ';';
+  }
+  return ',';
+}
 
 std::vector<std::string> csv_cells(std::string_view line, char separator) {
+  constexpr std::string_view kBlanks = " \t\r";
   std::vector<std::string> cells;
-  for (size_t at = 0; at <= line.size();) {
+  for (size_t at = 0; at <= line.size(); ++at) {  // from behind a separator to the next
+    std::string cell;
+    at = std::min(line.find_first_not_of(kBlanks, at), line.size());
+    if (at < line.size() && line[at] == '"') {
+      for (++at; at < line.size() && (line[at] != '"' || line.substr(at, 2) == "\"\""); ++at) {
+        if (line[at] == '"') ++at;
+        cell += line[at];
+      }
+      at = std::min(at + 1, line.size());
+    }
     const size_t end = std::min(line.find(separator, at), line.size());
-    const std::string_view cell = line.substr(at, end - at);
-    const size_t first = cell.find_first_not_of(" \t\r\""), last = cell.find_last_not_of(" \t\r\"");
-    cells.emplace_back(first == std::string_view::npos ? "" : cell.substr(first, last - first + 1));
-    at = end + 1;
+    cell += line.substr(at, end - at);
+    cell.resize(cell.find_last_not_of(kBlanks) + 1);
+    cells.push_back(std::move(cell));
+    at = end;
   }
   return cells;
 }

@@ -39,9 +39,10 @@ private:
 /// Words of a line separated by blanks, tabs or, where given, by one further character.
 std::vector<std::string_view> split_words(std::string_view line, char separator = ' ');
 
-/// What separates the cells of a CSV file with this header line: ';' where it has one, else ','.
+/// What separates the cells of a CSV file with this header line: ';' where it has one outside quotes, else ','.
 char csv_separator(std::string_view header);
-/// Cells of a line of a CSV file without the blanks and quotes around them; empty ones count.
+/// Cells of a line of a CSV file without the blanks and quotes around them; empty ones count. Between quotes a separator
+/// is text and "" a quote, as RFC 4180 has it.
 std::vector<std::string> csv_cells(std::string_view line, char separator);
 
 /// The faults of a data file on one line: the first, and how many more there are. Nothing where there are none.

@@ -136,11 +136,11 @@ void read_properties_yaml(const std::string& bytes) {
 }
 
 /// Opens the sequence and reads its first frames.
-void read_frames_of(const fs::path& path, const std::string& format) {
+void read_frames_of(const fs::path& path, const std::string& format, int64_t most = 3) {
   SequenceOptions options;
   options.format = format;
   const auto sequence = open_sequence(path, options);
-  for (int64_t i = 0; i < std::min<int64_t>(3, sequence->size()); ++i) sequence->read(i);
+  for (int64_t i = 0; i < std::min(most, sequence->size()); ++i) sequence->read(i);
 }
 
 void read_sens(const std::string& bytes) { read_frames_of(as_file("scan.sens", bytes), "sens"); }
@@ -163,7 +163,8 @@ void read_redwood_log(const std::string& bytes) {
   read_frames_of(scratch_folder() / "redwood", "redwood");
 }
 
-void read_scan(const std::string& bytes) { read_frames_of(as_file("scan.bin", bytes), "lidar"); }
+/// One of the views that are made of a scan, for they take their time.
+void read_scan(const std::string& bytes) { read_frames_of(as_file("scan.bin", bytes), "lidar", 1); }
 
 /// One scan that has a pose.
 void read_kitti_calibration(const std::string& bytes) {

@@ -120,6 +120,22 @@ TEST_CASE("of many classes the greatest are kept") {
   CHECK(of_class(joined_class_maps(maps, false, 3), 0, 0) == 0);
 }
 
+TEST_CASE("names of a CSV table may hold separators and quotes, between quotes") {
+  const TemporaryDirectory folder;
+  const fs::path file = folder.path() / "classes.csv";
+  const auto names = [&](const std::string& text) {
+    write_text(file, text);
+    const ClassTable table = read_class_table(file);
+    std::vector<std::string> all;
+    for (const ClassInfo& c : table.classes()) all.push_back(c.name);
+    return all;
+  };
+  CHECK(names("id,name\n1,\"door;double door\"\n2, \"chair, office\" \n3,\"12\"\" pipe\"\n") ==
+        std::vector<std::string>{"door;double door", "chair, office", "12\" pipe"});
+  CHECK(names("0;\"a;b\";1;2;3\n1; c ;4;5;6\r\n") == std::vector<std::string>{"a;b", "c"});
+  CHECK(names("\"id\",\"name; long\"\n4,d\n5,\"left open\n") == std::vector<std::string>{"d", "left open"});
+}
+
 TEST_CASE("the table that lies with the labels is theirs") {
   Recording recording;
   recording.options.classes_file.clear();
