@@ -12,9 +12,9 @@
 #include "apps/number_checks.h"
 #include "core/error.h"
 #include "core/simd.h"
-#include "io/open_sequence.h"
-#include "mapping/marching_cubes.h"
-#include "mapping/tsdf_integrator.h"
+#include "io/sequence/open_sequence.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/surface/marching_cubes.h"
 
 namespace felt::apps {
 namespace {
@@ -115,7 +115,7 @@ int run(const BenchOptions& o) {
                     row["mesh_ms"].get<double>(), row["blocks"].get<size_t>(), row["bytes"].get<double>() * 1e-6);
       report["fusion"].push_back(row);
     }
-  if (o.json) std::printf("%s\n", report.dump(2).c_str());
+  if (o.json) print_json(report);
   return kDone;
 }
 

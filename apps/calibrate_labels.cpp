@@ -8,10 +8,10 @@
 #include "apps/exit_code.h"
 #include "apps/progress.h"
 #include "core/error.h"
-#include "io/atomic_file.h"
-#include "io/confusion_file.h"
-#include "io/open_sequence.h"
-#include "mapping/label_calibration.h"
+#include "io/files/atomic_file.h"
+#include "io/sequence/open_sequence.h"
+#include "io/tables/confusion_file.h"
+#include "mapping/labels/label_calibration.h"
 
 namespace felt::apps {
 namespace {
@@ -30,9 +30,13 @@ std::unique_ptr<SequenceReader> open_reference(const CalibrateOptions& o, Sequen
   reading.labels_dir.clear();
   try {
     return open_sequence(o.reference, reading);
-  } catch (const FormatError&) {
+  } catch (const FormatError& as_sequence) {
     reading.labels_dir = o.reference;  // no layout: a folder of images
-    return open_sequence(o.sequence, reading);
+    try {
+      return open_sequence(o.sequence, reading);
+    } catch (const Error&) {
+      throw as_sequence;
+    }
   }
 }
 
@@ -73,16 +77,8 @@ Learned learn(const CalibrateOptions& o, const SequenceReader& predicted, const 
       continue;
     }
     ReadResult truth = SkippedFrame{-1, "no true labels", ""};
-    while (r < reference.size()) {
-      ReadResult candidate = reference.read(r);
-      const int64_t index = std::visit([](const auto& f) { return f.index; }, candidate);
-      if (index > frame->index) break;
-      ++r;
-      if (index == frame->index) {
-        truth = std::move(candidate);
-        break;
-      }
-    }
+    while (r < reference.size() && reference.name(r).index < frame->index) ++r;
+    if (r < reference.size() && reference.name(r).index == frame->index) truth = reference.read(r++);
     auto* true_frame = std::get_if<Frame>(&truth);
     if (true_frame == nullptr || true_frame->labels.empty()) {
       ++learned.skipped["no true labels"];
@@ -161,7 +157,7 @@ int run(const CalibrateOptions& o) {
   write_file_atomically(o.out, extension == ".csv" ? confusion_counts_csv(all.pixels, classes)
                                                    : confusion_counts_yaml(all.pixels, classes, comment));
   if (o.json) {
-    std::printf("%s\n", report.dump(2).c_str());
+    print_json(report);
   } else if (!o.quiet) {
     std::printf("%lld frames, %.3g pixels: %.1f %% labelled right\n", static_cast<long long>(learned.frames),
                 all.total(), 100 * all.correct() / all.total());

@@ -13,8 +13,8 @@
 namespace felt::apps {
 
 // A reconstruction can go on where an earlier one ended, however that ended: its map file is the checkpoint. The file
-// is whole at every moment (io/atomic_file.h), and besides the map it holds the settings and how far the sequence was
-// read.
+// is whole at every moment (io/files/atomic_file.h), and besides the map it holds the settings and how far the sequence
+// was read.
 
 /// The part of the settings that shapes what a frame does to a map, as text: what the frame journal notes. Paths and
 /// the selection of frames are left out, so that parts of one recording have the same.

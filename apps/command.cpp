@@ -3,6 +3,8 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
+#include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include <thread>
 
@@ -54,5 +56,11 @@ CLI::App& add_command(CLI::App& app, const CommandText& text, CommonOptions& com
   });
   return command;
 }
+
+std::string json_text(const nlohmann::ordered_json& document) {
+  return document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+void print_json(const nlohmann::ordered_json& document) { std::printf("%s\n", json_text(document).c_str()); }
 
 }  // namespace felt::apps

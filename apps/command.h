@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 namespace felt::apps {
@@ -28,5 +29,10 @@ struct CommandText {
 /// and the number of threads are set up and `run` is called; its return value is the exit code. Errors leave `run` as
 /// exceptions (core/error.h).
 CLI::App& add_command(CLI::App& app, const CommandText& text, CommonOptions& common, std::function<int()> run);
+
+/// A document as indented text. Bytes of paths that are no UTF-8, which JSON cannot hold, are replaced.
+std::string json_text(const nlohmann::ordered_json& document);
+/// The same on stdout.
+void print_json(const nlohmann::ordered_json& document);
 
 }  // namespace felt::apps

@@ -8,8 +8,8 @@
 #include "apps/number_checks.h"
 #include "apps/progress.h"
 #include "apps/reading_options.h"
-#include "io/convert.h"
-#include "io/open_sequence.h"
+#include "io/sequence/convert.h"
+#include "io/sequence/open_sequence.h"
 
 namespace felt::apps {
 namespace {
@@ -40,7 +40,7 @@ int run(const Arguments& a) {
                                          {"skipped", result.skipped},
                                          {"depth_out_of_range", result.depth_out_of_range},
                                          {"left_out", result.left_out}};
-    std::printf("%s\n", json.dump(2).c_str());
+    print_json(json);
   } else if (!a.common.quiet) {
     for (const std::string& what : result.left_out)
       std::fprintf(stderr, "feltmap: warning: %s left out: the layout %s has no place for them\n", what.c_str(),

@@ -5,8 +5,8 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
-#include "io/map_diff_report.h"
-#include "io/map_file.h"
+#include "io/map_file/map_diff_report.h"
+#include "io/map_file/map_file.h"
 
 namespace felt::apps {
 namespace {

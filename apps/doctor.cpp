@@ -5,7 +5,7 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/reading_options.h"
-#include "io/doctor.h"
+#include "io/doctor/doctor.h"
 
 namespace felt::apps {
 namespace {
@@ -73,7 +73,7 @@ void add_doctor(CLI::App& app) {
       a->common, [a] {
         const Examination examination = examine_sequence(a->sequence, resolve(a->reading));
         if (a->common.json)
-          std::printf("%s\n", to_json(examination).dump(2).c_str());
+          print_json(to_json(examination));
         else
           print(examination, a->common.quiet);
         return examination.faulty() ? kDifferent : kDone;

@@ -11,14 +11,14 @@
 #include "apps/progress.h"
 #include "apps/touch_options.h"
 #include "core/error.h"
-#include "io/class_table_file.h"
-#include "io/map_file.h"
-#include "io/mesh_io.h"
-#include "io/open_sequence.h"
-#include "io/pose_list.h"
-#include "io/reliability_plot.h"
-#include "io/touches.h"
-#include "mapping/marching_cubes.h"
+#include "io/map_file/map_file.h"
+#include "io/meshes/mesh_io.h"
+#include "io/pictures/reliability_plot.h"
+#include "io/readings/touches.h"
+#include "io/sequence/open_sequence.h"
+#include "io/sequence/pose_list.h"
+#include "io/tables/class_table_file.h"
+#include "mapping/surface/marching_cubes.h"
 
 namespace felt::apps {
 namespace {
@@ -273,7 +273,7 @@ int evaluate(EvaluateCommand& command) {
     json["reliability"] = command.reliability;
   }
   json["definitions"] = std::move(definitions);
-  if (command.common.json) std::printf("%s\n", json.dump(2).c_str());
+  if (command.common.json) print_json(json);
   return kDone;
 }
 

@@ -4,8 +4,8 @@
 #include <string>
 
 #include "core/class_table.h"
-#include "mapping/evaluate_geometry.h"
-#include "mapping/evaluate_labels.h"
+#include "mapping/evaluation/evaluate_geometry.h"
+#include "mapping/evaluation/evaluate_labels.h"
 
 namespace felt::apps {
 
@@ -16,7 +16,7 @@ nlohmann::ordered_json geometry_definitions(const GeometryOptions& options, bool
 
 /// `labels`: accuracies and IoU with the confusion matrix; `calibration` and `class_images` where there are any.
 nlohmann::ordered_json label_json(const LabelScores& scores, const ClassTable& classes);
-/// `where`: "a pixel" or "a sample", for the words.
+/// `what_counts`: "a pixel" or "a sample", for the words.
 nlohmann::ordered_json label_definitions(const LabelScores& scores, const std::string& what_counts);
 
 nlohmann::ordered_json property_json(const PropertyScores& scores);

@@ -10,14 +10,14 @@
 #include "apps/exit_code.h"
 #include "apps/touch_options.h"
 #include "core/error.h"
-#include "io/map_file.h"
-#include "io/map_grids.h"
-#include "io/mesh_io.h"
-#include "mapping/crop.h"
-#include "mapping/marching_cubes.h"
-#include "mapping/mesh_part.h"
-#include "mapping/region_query.h"
-#include "mapping/surface_color.h"
+#include "io/map_file/map_file.h"
+#include "io/map_file/map_grids.h"
+#include "io/meshes/mesh_io.h"
+#include "mapping/maps/crop.h"
+#include "mapping/regions/region_query.h"
+#include "mapping/surface/marching_cubes.h"
+#include "mapping/surface/mesh_part.h"
+#include "mapping/surface/surface_color.h"
 
 namespace felt::apps {
 namespace {
@@ -134,7 +134,7 @@ int run(const ExportOptions& o) {
   if (!o.mesh.empty() || !o.points.empty() || !o.html.empty())
     written.update(write_surface(map, part ? &*part : nullptr, o));
   if (o.json) {
-    std::printf("%s\n", written.dump(2).c_str());
+    print_json(written);
   } else if (!o.quiet) {
     for (const auto& [kind, what] : written.items()) {
       if (kind == "colors")

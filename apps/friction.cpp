@@ -7,9 +7,9 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/touch_options.h"
-#include "io/atomic_file.h"
-#include "io/friction_log.h"
-#include "io/map_file.h"
+#include "io/files/atomic_file.h"
+#include "io/map_file/map_file.h"
+#include "io/readings/friction_log.h"
 
 namespace felt::apps {
 namespace {
@@ -36,10 +36,12 @@ int run_friction(const FrictionOptions& options) {
   const FrictionReading reading = friction_reading(log, settings);
   if (!options.plot.empty()) write_plot_svg(options.plot, friction_plots(log, reading));
   const double stamp_s = log.time_s[reading.slide_begin];
-  char touch[256];
-  snprintf(touch, sizeof touch, "%.6f,%s,friction,%.4f,%.4f", stamp_s,
-           options.at.empty() ? "x,y,z" : options.at.c_str(), reading.kinetic_mean, reading.kinetic_sd);
-  const std::string touches = std::string("stamp,x,y,z,property,value,sigma\n") + touch + "\n";
+  char stamp[64], value[64];
+  std::snprintf(stamp, sizeof stamp, "%.6f", stamp_s);
+  std::snprintf(value, sizeof value, "%.4f,%.4f", reading.kinetic_mean, reading.kinetic_sd);
+  const std::string touch =
+      std::string(stamp) + "," + (options.at.empty() ? "x,y,z" : options.at) + ",friction," + value;
+  const std::string touches = "stamp,x,y,z,property,value,sigma\n" + touch + "\n";
   if (!options.touch.empty()) write_file_atomically(options.touch, touches);
   if (options.json) {
     const auto time = [&](size_t i) { return log.time_s[std::min(i, log.time_s.size() - 1)]; };
@@ -50,7 +52,7 @@ int run_friction(const FrictionOptions& options) {
                    {"normal", point_json(settings.normal)},
                    {"normal_from", normal_from},
                    {"touch", touch}};
-    std::printf("%s\n", out.dump(2).c_str());
+    print_json(out);
     return kDone;
   }
   std::printf("kinetic %.4f +- %.4f, static peak %.4f (contact normal %.3f,%.3f,%.3f, %s)\n", reading.kinetic_mean,

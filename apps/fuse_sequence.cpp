@@ -2,7 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include "mapping/ignored_classes.h"
+#include "mapping/labels/ignored_classes.h"
 
 namespace felt::apps {
 

@@ -4,10 +4,10 @@
 #include <string>
 
 #include "apps/reconstruct_report.h"
-#include "io/decode_ahead.h"
-#include "mapping/integration_config.h"
+#include "io/sequence/decode_ahead.h"
+#include "mapping/fusion/integration_config.h"
+#include "mapping/fusion/tsdf_integrator.h"
 #include "mapping/map.h"
-#include "mapping/tsdf_integrator.h"
 
 namespace felt::apps {
 

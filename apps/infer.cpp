@@ -14,10 +14,10 @@
 #include "apps/number_checks.h"
 #include "core/error.h"
 #include "core/simd.h"
-#include "io/fit_priors.h"
-#include "io/infer_json.h"
-#include "io/infer_plot.h"
-#include "io/property_yaml.h"
+#include "io/readings/fit_priors.h"
+#include "io/readings/infer_json.h"
+#include "io/readings/infer_plot.h"
+#include "io/tables/property_yaml.h"
 
 namespace felt::apps {
 namespace {

@@ -10,12 +10,12 @@
 #include "apps/exit_code.h"
 #include "apps/reading_options.h"
 #include "core/error.h"
-#include "io/map_file.h"
-#include "io/map_grids.h"
-#include "io/open_sequence.h"
-#include "io/picture.h"
-#include "io/sequence_picture.h"
-#include "mapping/crop.h"
+#include "io/map_file/map_file.h"
+#include "io/map_file/map_grids.h"
+#include "io/pictures/picture.h"
+#include "io/pictures/sequence_picture.h"
+#include "io/sequence/open_sequence.h"
+#include "mapping/maps/crop.h"
 
 namespace felt::apps {
 namespace {
@@ -142,7 +142,7 @@ int run(const fs::path& path, const ReadingArguments& reading, bool with_grids, 
   const Json json = is_map ? describe_map(path, with_grids) : describe_sequence(path, options);
   if (!pictures.empty()) write_pictures(path, options, pictures);
   if (common.json) {
-    std::printf("%s\n", json.dump(2).c_str());
+    print_json(json);
   } else {
     print_lines(json, "");
   }

@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
-#include "io/confusion_file.h"
-#include "mapping/ignored_classes.h"
+#include "io/tables/confusion_file.h"
+#include "mapping/labels/ignored_classes.h"
 
 namespace felt::apps {
 namespace {

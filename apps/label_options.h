@@ -5,9 +5,9 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "core/class_table.h"
-#include "io/label_settings.h"
-#include "mapping/integration_config.h"
-#include "mapping/label_evidence.h"
+#include "io/settings/label_settings.h"
+#include "mapping/fusion/integration_config.h"
+#include "mapping/fusion/label_evidence.h"
 
 namespace felt::apps {
 

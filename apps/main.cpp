@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <new>
 #include <sstream>
 #include <string>
@@ -10,7 +11,7 @@
 #include "apps/exit_code.h"
 #include "core/error.h"
 #include "core/simd.h"
-#include "io/system_memory.h"
+#include "io/files/system_memory.h"
 
 namespace felt::apps {
 namespace {
@@ -85,6 +86,8 @@ int main(int argc, char** argv) {
     return fail(kConfiguration, e.what());
   } catch (const felt::Error& e) {
     return fail(kInputOutput, e.what());
+  } catch (const std::filesystem::filesystem_error& e) {
+    return fail(kInputOutput, e.path1().string() + ": " + e.code().message());
   } catch (const std::bad_alloc&) {
     return fail(kInternal, "out of memory");
   } catch (const std::exception& e) {

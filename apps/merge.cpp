@@ -8,8 +8,8 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
-#include "io/map_file.h"
-#include "mapping/merge.h"
+#include "io/map_file/map_file.h"
+#include "mapping/maps/merge.h"
 
 namespace felt::apps {
 namespace {
@@ -46,7 +46,7 @@ int run(const Options& options) {
       {"time_s",
        {{"load", seconds(start, loaded)}, {"merge", seconds(loaded, merged)}, {"save", seconds(merged, saved)}}}};
   if (options.common.json)
-    std::printf("%s\n", report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    print_json(report);
   else if (!options.common.quiet)
     std::printf("%s: %zu maps merged: %zu frames, %zu blocks, hash %s\n", options.out.c_str(), maps.size(),
                 frame_count(result.frames), result.store.size(), report.at("map_hash").get<std::string>().c_str());

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "io/text_input.h"
+#include "io/files/text_input.h"
 
 namespace felt::apps {
 namespace {

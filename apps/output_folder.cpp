@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "core/error.h"
-#include "io/atomic_file.h"
+#include "io/files/atomic_file.h"
 
 namespace felt::apps {
 namespace fs = std::filesystem;

@@ -12,8 +12,8 @@
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
 #include "apps/touch_options.h"
-#include "io/map_file.h"
-#include "io/mask_image.h"
+#include "io/map_file/map_file.h"
+#include "io/readings/mask_image.h"
 
 namespace felt::apps {
 namespace {
@@ -74,7 +74,7 @@ int run_query(const QueryOptions& options) {
   json all = json::array();
   for (const Eigen::Vector3d& point : points) all.push_back(answer(map, beliefs, point, options.below, instances));
   if (options.json) {
-    std::printf("%s\n", json{{"points", all}}.dump(2).c_str());
+    print_json(json{{"points", all}});
     return kDone;
   }
   for (size_t i = 0; i < points.size(); ++i) {

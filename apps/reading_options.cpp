@@ -4,7 +4,7 @@
 #include <functional>
 
 #include "core/error.h"
-#include "io/pose_list.h"
+#include "io/sequence/pose_list.h"
 
 namespace felt::apps {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "io/sequence_options.h"
+#include "io/sequence/sequence_options.h"
 
 namespace felt::apps {
 

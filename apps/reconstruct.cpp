@@ -22,16 +22,16 @@
 #include "apps/recorded_touches.h"
 #include "core/error.h"
 #include "core/simd.h"
-#include "io/atomic_file.h"
-#include "io/decode_ahead.h"
-#include "io/doctor.h"
-#include "io/mesh_io.h"
-#include "io/open_sequence.h"
-#include "io/system_memory.h"
-#include "mapping/marching_cubes.h"
-#include "mapping/size_estimate.h"
-#include "mapping/surface_color.h"
-#include "mapping/touch_update.h"
+#include "io/doctor/doctor.h"
+#include "io/files/atomic_file.h"
+#include "io/files/system_memory.h"
+#include "io/meshes/mesh_io.h"
+#include "io/sequence/decode_ahead.h"
+#include "io/sequence/open_sequence.h"
+#include "mapping/store/size_estimate.h"
+#include "mapping/surface/marching_cubes.h"
+#include "mapping/surface/surface_color.h"
+#include "mapping/touch/touch_update.h"
 
 namespace felt::apps {
 namespace {
@@ -276,7 +276,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   if (!touches.file.empty())
     document["touches"] =
         touches_done.empty() ? touches_json(touches, touched) : nlohmann::ordered_json::parse(touches_done);
-  const std::string json = document.dump(2) + "\n";
+  const std::string json = json_text(document) + "\n";
   write_file_atomically(options.out / kReportName, json);
 
   if (report.mesh_triangles == 0)

@@ -8,7 +8,7 @@
 #include "apps/label_options.h"
 #include "apps/number_checks.h"
 #include "core/error.h"
-#include "io/reconstruct_config.h"
+#include "io/settings/reconstruct_config.h"
 
 namespace felt::apps {
 namespace {
@@ -203,7 +203,16 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   }
   if (reading.depth_scale) json["depth_scale"] = *reading.depth_scale;
   if (reading.pose_convention) json["pose_convention"] = to_string(*reading.pose_convention);
-  if (reading.depth_encoding == DepthEncoding::rotated3) json["depth_encoding"] = "rotated3";
+  if (reading.depth_encoding)
+    json["depth_encoding"] = *reading.depth_encoding == DepthEncoding::rotated3 ? "rotated3" : "plain";
+  if (reading.distortion) {
+    const Distortion& d = *reading.distortion;
+    json["distortion"] = {d.k1, d.k2, d.p1, d.p2, d.k3};
+  }
+  if (reading.T_body_camera)
+    for (int row = 0; row < 4; ++row)
+      for (int column = 0; column < 4; ++column)
+        json["T_body_camera"].push_back(reading.T_body_camera->matrix()(row, column));
   if (reading.depth_is_ray_length) json["ray_length"] = *reading.depth_is_ray_length;
   if (!reading.labels_dir.empty()) json["labels"] = reading.labels_dir.string();
   if (!reading.probs_dir.empty()) json["probs"] = reading.probs_dir.string();
@@ -215,7 +224,8 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   if (reading.label_offset != 0) json["label_offset"] = reading.label_offset;
   if (reading.bgr) json["bgr"] = true;
   json["color"] = reading.read_color;
-  if (options.perception.asked()) json["perception"] = to_json(options.perception);
+  if (options.perception.asked() || !options.perception.instances.empty())
+    json["perception"] = to_json(options.perception);
   json["voxel_size_m"] = options.voxel_size_m;
   json["truncation_m"] = options.truncation_m;
   json["min_depth_m"] = short_decimal(fusion.min_depth_m);

@@ -7,10 +7,10 @@
 
 #include "apps/perception_options.h"
 #include "apps/reading_options.h"
-#include "io/label_settings.h"
-#include "io/reader.h"
-#include "io/sequence_options.h"
-#include "mapping/integration_config.h"
+#include "io/sequence/reader.h"
+#include "io/sequence/sequence_options.h"
+#include "io/settings/label_settings.h"
+#include "mapping/fusion/integration_config.h"
 
 namespace felt::apps {
 

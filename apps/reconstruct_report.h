@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/label_fusion.h"
+#include "mapping/fusion/label_fusion.h"
 
 namespace felt::apps {
 
@@ -47,7 +47,7 @@ struct ReconstructReport {
 /// The value below which a share `p` of `values` lies (nearest rank); 0 where there are none.
 double percentile(std::vector<double> values, double p);
 
-/// `config`: the settings as used. The keys are a contract: docs/cli.md.
+/// `config`: the settings as used. Others rely on the keys: none may change.
 nlohmann::ordered_json to_json(const ReconstructReport& report, const nlohmann::ordered_json& config);
 
 }  // namespace felt::apps

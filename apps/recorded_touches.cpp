@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "core/error.h"
-#include "io/open_sequence.h"
-#include "io/property_yaml.h"
-#include "io/text_input.h"
+#include "io/files/text_input.h"
+#include "io/sequence/open_sequence.h"
+#include "io/tables/property_yaml.h"
 
 namespace felt::apps {
 namespace {

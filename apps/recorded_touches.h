@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "apps/reconstruct_options.h"
-#include "io/reader.h"
-#include "io/touches.h"
+#include "io/readings/touches.h"
+#include "io/sequence/reader.h"
 
 namespace felt::apps {
 
@@ -22,9 +22,9 @@ struct TouchPlan {
 };
 
 /// Reads the property table and the touches that the options name, or that the sequence carries. Throws ConfigError or
-/// FormatError, with every problem and its line, for touches that cannot belong to the sequence (a stamp outside it) or
-/// that no map of it can hold (an unknown property, a value outside its support). What the sequence merely carries is
-/// left unused where there is no property table or no class with a prior.
+/// FormatError, with the first problem, its line, and how many more, for touches that cannot belong to the sequence (a
+/// stamp outside it) or that no map of it can hold (an unknown property, a value outside its support). What the
+/// sequence merely carries is left unused where there is no property table or no class with a prior.
 TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& selected, const ClassTable& classes);
 
 /// Applies them to the finished map. A touch whose place cannot be touched leaves the map as it was.

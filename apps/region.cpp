@@ -7,9 +7,9 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/touch_options.h"
-#include "io/map_file.h"
-#include "io/mesh_io.h"
-#include "mapping/region_mesh.h"
+#include "io/map_file/map_file.h"
+#include "io/meshes/mesh_io.h"
+#include "mapping/surface/region_mesh.h"
 
 namespace felt::apps {
 namespace {
@@ -41,7 +41,7 @@ int run_region(const RegionCommandOptions& options) {
     out["rule"] = rule_name(settings.rule);
     if (settings.rule == RegionRule::connected) out["normal_limit_deg"] = normal_limit_deg(map, contact, settings);
     out["belief"] = belief_json(map, belief, options.below);
-    std::printf("%s\n", out.dump(2).c_str());
+    print_json(out);
     return kDone;
   }
   std::printf("%zu voxels in %zu blocks, %.3f m2, from (%.3f, %.3f, %.3f) to (%.3f, %.3f, %.3f) m\n", summary.voxels,

@@ -11,12 +11,12 @@
 #include "apps/number_checks.h"
 #include "apps/touch_options.h"
 #include "core/error.h"
-#include "io/map_file.h"
-#include "io/picture.h"
-#include "io/pose_list.h"
-#include "mapping/marching_cubes.h"
-#include "mapping/render.h"
-#include "mapping/render_classes.h"
+#include "io/map_file/map_file.h"
+#include "io/pictures/picture.h"
+#include "io/sequence/pose_list.h"
+#include "mapping/surface/marching_cubes.h"
+#include "mapping/surface/render.h"
+#include "mapping/surface/render_classes.h"
 
 namespace felt::apps {
 namespace {
@@ -163,7 +163,7 @@ int render(const RenderCommand& command) {
       json["views"].push_back(write_view(command, source, source.caster.render(camera, poses[i], command.options), i));
   }
   if (command.common.json) {
-    std::printf("%s\n", json.dump(2).c_str());
+    print_json(json);
   } else if (!command.common.quiet) {
     if (!poses.empty()) std::printf("%zu views of %s in %s\n", poses.size(), command.map.c_str(), command.out.c_str());
     if (!command.overview.empty()) std::printf("overview of %s in %s\n", command.map.c_str(), command.overview.c_str());

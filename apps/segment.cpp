@@ -12,12 +12,12 @@
 #include "apps/perception_options.h"
 #include "apps/progress.h"
 #include "core/error.h"
-#include "io/atomic_file.h"
-#include "io/class_table_file.h"
-#include "io/decode_ahead.h"
-#include "io/label_images.h"
-#include "io/open_sequence.h"
-#include "io/text_input.h"
+#include "io/files/atomic_file.h"
+#include "io/files/text_input.h"
+#include "io/images/label_images.h"
+#include "io/sequence/decode_ahead.h"
+#include "io/sequence/open_sequence.h"
+#include "io/tables/class_table_file.h"
 
 namespace felt::apps {
 namespace {
@@ -74,7 +74,7 @@ json state_of(const SegmentOptions& options, const ClassTable& classes) {
 void prepare(const SegmentOptions& options, const OutputNames& names, const ClassTable& classes) {
   prepare_output_folder(options.out, {}, false);
   const fs::path file = options.out / kStateName;
-  const std::string state = state_of(options, classes).dump(2) + "\n";
+  const std::string state = json_text(state_of(options, classes)) + "\n";
   if (fs::exists(file) && !options.overwrite) {
     if (read_whole_file(file) == state) return;
     throw ConfigError(describe_mismatch(options.out.string(), "output exists",
@@ -153,22 +153,18 @@ int run_segment(const SegmentOptions& options) {
   if (options.json) {
     json skipped = json::object();
     for (const auto& [reason, count] : record.skipped) skipped[reason] = count;
-    std::printf("%s\n", json{{"frames",
-                              {{"read", record.read},
-                               {"written", record.written},
-                               {"already_there", record.present},
-                               {"skipped", skipped}}},
-                             {kind, (options.out / kind).string()},
-                             {"classes", (options.out / kClassesName).string()},
-                             {"time_s",
-                              {{"total", record.total_s},
-                               {"network", record.network_s},
-                               {"vote", record.vote_s},
-                               {"decode", record.decode_s},
-                               {"write", record.write_s}}},
-                             {"threads", options.thread_count()}}
-                            .dump(2)
-                            .c_str());
+    print_json(json{
+        {"frames",
+         {{"read", record.read}, {"written", record.written}, {"already_there", record.present}, {"skipped", skipped}}},
+        {kind, (options.out / kind).string()},
+        {"classes", (options.out / kClassesName).string()},
+        {"time_s",
+         {{"total", record.total_s},
+          {"network", record.network_s},
+          {"vote", record.vote_s},
+          {"decode", record.decode_s},
+          {"write", record.write_s}}},
+        {"threads", options.thread_count()}});
   } else if (!options.quiet) {
     std::printf("%lld frames segmented in %.2f s, %lld were there: %s\n", static_cast<long long>(record.written),
                 record.total_s, static_cast<long long>(record.present), (options.out / kind).c_str());

@@ -10,10 +10,10 @@
 #include "apps/interrupt.h"
 #include "apps/progress.h"
 #include "core/error.h"
-#include "io/confusion_file.h"
-#include "io/property_yaml.h"
 #include "io/simulation/scene_file.h"
 #include "io/simulation/sequence_writer.h"
+#include "io/tables/confusion_file.h"
+#include "io/tables/property_yaml.h"
 
 namespace felt::apps {
 namespace {
@@ -54,11 +54,11 @@ int list_scenes(const SimulateOptions& o) {
     else
       std::printf("%-14s %s\n", name.c_str(), scene.description.c_str());
   }
-  if (o.common.json) std::printf("%s\n", scenes.dump(2).c_str());
+  if (o.common.json) print_json(scenes);
   return kDone;
 }
 
-/// A built-in scene, or a file where one of that name exists or the name has a file's extension.
+/// A file where the name has a file's extension, else a built-in scene.
 Scene scene_of(const std::string& name) {
   const std::string extension = fs::path(name).extension();
   return extension == ".yaml" || extension == ".yml" || extension == ".json" ? read_scene(name) : make_scene(name);
@@ -131,11 +131,7 @@ int run_simulate(const SimulateOptions& o) {
     return kInterrupted;
   }
   if (o.common.json)
-    std::printf(
-        "%s\n",
-        nlohmann::ordered_json{{"scene", settings.scene.name}, {"frames", o.frames}, {"out", o.out}, {"seed", o.seed}}
-            .dump(2)
-            .c_str());
+    print_json({{"scene", settings.scene.name}, {"frames", o.frames}, {"out", o.out}, {"seed", o.seed}});
   else if (!o.common.quiet)
     std::printf("%d frames of %s (%s) in %s\n", o.frames, settings.scene.name.c_str(),
                 settings.scene.description.c_str(), o.out.c_str());

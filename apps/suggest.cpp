@@ -8,8 +8,8 @@
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
 #include "apps/touch_options.h"
-#include "io/map_file.h"
-#include "mapping/touch_suggestion.h"
+#include "io/map_file/map_file.h"
+#include "mapping/touch/touch_suggestion.h"
 
 namespace felt::apps {
 namespace {
@@ -53,7 +53,7 @@ int run_suggest(const SuggestOptions& options) {
   json all = json::array();
   for (const Suggestion& s : suggestions) all.push_back(suggestion_json(map, s));
   if (options.json) {
-    std::printf("%s\n", json{{"property", options.property}, {"suggestions", all}}.dump(2).c_str());
+    print_json(json{{"property", options.property}, {"suggestions", all}});
     return kDone;
   }
   for (const Suggestion& s : suggestions) {

@@ -12,10 +12,10 @@
 #include "apps/exit_code.h"
 #include "apps/touch_options.h"
 #include "inference/decision.h"
-#include "io/map_file.h"
-#include "io/open_sequence.h"
-#include "io/touch_json.h"
-#include "io/touches.h"
+#include "io/map_file/map_file.h"
+#include "io/readings/touch_json.h"
+#include "io/readings/touches.h"
+#include "io/sequence/open_sequence.h"
 
 namespace felt::apps {
 namespace {
@@ -121,7 +121,7 @@ int list_touches(const TouchOptions& options) {
     out["touches"] = json::parse(touch_journal_json(map.touches));
     for (size_t t = 0; t < map.touches.touches.size(); ++t)
       out["touches"][t]["voxels"] = map.touches.touches[t].region.voxels();
-    std::printf("%s\n", out.dump(2).c_str());
+    print_json(out);
     return kDone;
   }
   const auto text = [&](const BeliefSummary& belief) {
@@ -223,7 +223,7 @@ int run_touch(const TouchOptions& options) {
   if (!options.dry_run) save_map(map, options.out.empty() ? options.map : options.out);
   // Only what is done is said to be.
   if (options.json) {
-    std::printf("%s\n", out.dump(2).c_str());
+    print_json(out);
   } else {
     if (!said.empty()) std::printf("%s\n", said.c_str());
     for (const TouchEffect& effect : effects) print_effect(map, effect, request.region);

@@ -7,8 +7,8 @@
 
 #include "core/error.h"
 #include "inference/decision.h"
-#include "io/mask_image.h"
-#include "io/property_yaml.h"
+#include "io/readings/mask_image.h"
+#include "io/tables/property_yaml.h"
 
 namespace felt::apps {
 namespace {
@@ -119,8 +119,6 @@ std::optional<ViewMask> RegionOptions::view() const {
     throw TouchError("region mask: expected --mask, --intrinsics and --pose, found not all of them");
   return read_view_mask(mask, intrinsics, pose);
 }
-
-json number_or_null(double x) { return std::isfinite(x) ? json(x) : json(nullptr); }
 
 json point_json(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z()}; }
 

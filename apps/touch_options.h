@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/camera.h"
-#include "mapping/region_query.h"
-#include "mapping/touch_state.h"
+#include "mapping/regions/region_query.h"
+#include "mapping/touch/touch_state.h"
 
 namespace felt::apps {
 
@@ -30,9 +30,6 @@ struct RegionOptions {
   /// The mask with its camera where the rule is `mask`.
   std::optional<ViewMask> view() const;
 };
-
-/// A number, or null where it is not finite.
-nlohmann::ordered_json number_or_null(double x);
 
 /// Class posterior and, per property, mean, sd, quantiles, CVaR, and with `below` P(psi <= below). What does not exist
 /// is null with its reason.

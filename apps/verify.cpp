@@ -6,8 +6,8 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "core/error.h"
-#include "io/map_file.h"
-#include "mapping/map_verify.h"
+#include "io/map_file/map_file.h"
+#include "mapping/maps/map_verify.h"
 
 namespace felt::apps {
 namespace {
@@ -19,7 +19,7 @@ struct Options {
 
 int print(const Options& options, const nlohmann::json& report, const std::string& text) {
   if (options.common.json)
-    std::printf("%s\n", report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+    print_json(report);
   else if (!options.common.quiet || !report.at("sound"))
     std::printf("%s", text.c_str());
   return report.at("sound") ? kDone : kDifferent;

@@ -7,7 +7,8 @@
 namespace felt {
 
 /// Base of every error that a user can cause. The message is one line: what failed, where (path:line or key), what was
-/// expected and what was found. Programmer errors are assertions, and a bad frame of a sequence is data (io/reader.h).
+/// expected and what was found. Programmer errors are assertions, and a bad frame of a sequence is data
+/// (io/sequence/reader.h).
 class Error : public std::runtime_error {
 public:
   using std::runtime_error::runtime_error;

@@ -6,9 +6,9 @@
 
 #include "core/class_table.h"
 #include "core/property_table.h"
-#include "mapping/block_store.h"
-#include "mapping/frame_journal.h"
-#include "mapping/touch_journal.h"
+#include "mapping/store/block_store.h"
+#include "mapping/store/frame_journal.h"
+#include "mapping/store/touch_journal.h"
 
 namespace felt {
 

@@ -15,9 +15,9 @@
 #include <string>
 #include <vector>
 
-#include "io/depth_decode.h"
-#include "io/image_decode.h"
-#include "io/text_input.h"
+#include "io/files/text_input.h"
+#include "io/images/depth_decode.h"
+#include "io/images/image_decode.h"
 
 namespace {
 

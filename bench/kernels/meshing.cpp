@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "bench/support/room.h"
-#include "mapping/marching_cubes.h"
+#include "mapping/surface/marching_cubes.h"
 
 namespace {
 using namespace felt;

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <random>
 
-#include "mapping/region_query.h"
-#include "mapping/region_surface.h"
+#include "mapping/regions/region_query.h"
+#include "mapping/regions/region_surface.h"
 
 namespace {
 using namespace felt;

@@ -11,8 +11,8 @@
 #include <span>
 
 #include "inference/mixture.h"
-#include "mapping/touch_mixture.h"
-#include "mapping/touch_update.h"
+#include "mapping/touch/touch_mixture.h"
+#include "mapping/touch/touch_update.h"
 
 namespace {
 using namespace felt;

@@ -6,7 +6,7 @@
 
 #include "bench/paper/friction_table.h"
 #include "inference/nig.h"
-#include "mapping/evaluate_predictions.h"
+#include "mapping/evaluation/evaluate_predictions.h"
 
 // How often a region's class is right after touching it, simulated (docs/inference.md, "Simulated labels").
 //

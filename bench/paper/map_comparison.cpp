@@ -7,9 +7,9 @@
 
 #include "io/simulation/label_network.h"
 #include "io/simulation/random.h"
-#include "mapping/touch_suggestion.h"
-#include "mapping/touch_update.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/touch/touch_suggestion.h"
+#include "mapping/touch/touch_update.h"
 
 namespace felt::paper {
 namespace {

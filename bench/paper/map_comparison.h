@@ -7,7 +7,7 @@
 #include "core/confusion_matrix.h"
 #include "core/frame.h"
 #include "core/property_table.h"
-#include "mapping/evaluate_labels.h"
+#include "mapping/evaluation/evaluate_labels.h"
 #include "mapping/map.h"
 
 // Maps of one recording with true labels, seen by a simulated network and touched in simulation.

@@ -8,13 +8,13 @@
 #include <cstdlib>
 
 #include "bench/support/bench.h"
-#include "io/map_file.h"
-#include "io/picture.h"
+#include "io/map_file/map_file.h"
+#include "io/pictures/picture.h"
 #include "io/segmentation/segment_source.h"
 #include "io/segmentation/segmenter.h"
-#include "mapping/render_classes.h"
-#include "mapping/segment_voting.h"
-#include "mapping/voxel_beliefs.h"
+#include "mapping/labels/segment_voting.h"
+#include "mapping/surface/render_classes.h"
+#include "mapping/touch/voxel_beliefs.h"
 
 namespace {
 using namespace felt;

@@ -7,13 +7,13 @@
 #include "bench/paper/experiments.h"
 #include "bench/paper/map_comparison.h"
 #include "bench/paper/pictures.h"
-#include "io/picture.h"
+#include "io/pictures/picture.h"
 #include "io/simulation/furniture.h"
 #include "io/simulation/label_network.h"
 #include "io/simulation/render_sequence.h"
 #include "io/simulation/scene_library.h"
 #include "io/simulation/touches.h"
-#include "mapping/render_classes.h"
+#include "mapping/surface/render_classes.h"
 
 namespace felt::paper {
 namespace {

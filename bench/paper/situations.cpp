@@ -5,14 +5,14 @@
 
 #include "bench/paper/experiments.h"
 #include "inference/mixture.h"
-#include "io/plot_svg.h"
+#include "io/pictures/plot_svg.h"
 #include "io/simulation/furniture.h"
 #include "io/simulation/render_sequence.h"
 #include "io/simulation/scene_library.h"
 #include "io/simulation/touches.h"
-#include "mapping/render.h"
-#include "mapping/touch_update.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/surface/render.h"
+#include "mapping/touch/touch_update.h"
 
 namespace felt::paper {
 namespace {

@@ -20,11 +20,11 @@
 #include "bench/support/bench.h"
 #include "inference/decision.h"
 #include "inference/prior_fit.h"
-#include "io/image_decode.h"
-#include "io/text_input.h"
-#include "mapping/touch_update.h"
-#include "mapping/touch_view.h"
-#include "mapping/tsdf_integrator.h"
+#include "io/files/text_input.h"
+#include "io/images/image_decode.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/touch/touch_update.h"
+#include "mapping/touch/touch_view.h"
 
 namespace felt {
 namespace {

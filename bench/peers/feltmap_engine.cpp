@@ -1,6 +1,6 @@
 #include "bench/peers/engine.h"
-#include "mapping/marching_cubes.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/surface/marching_cubes.h"
 
 namespace felt::bench {
 namespace {

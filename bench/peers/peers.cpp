@@ -11,9 +11,9 @@
 #include "bench/peers/engine.h"
 #include "bench/support/bench.h"
 #include "core/simd.h"
-#include "io/mesh_io.h"
+#include "io/meshes/mesh_io.h"
 #include "io/simulation/render_sequence.h"
-#include "mapping/mesh_distance.h"
+#include "mapping/evaluation/mesh_distance.h"
 
 namespace {
 

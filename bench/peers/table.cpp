@@ -18,8 +18,8 @@
 #include "bench/support/bench.h"
 #include "bench/support/bound.h"
 #include "core/simd.h"
-#include "io/mesh_io.h"
-#include "mapping/mesh_distance.h"
+#include "io/meshes/mesh_io.h"
+#include "mapping/evaluation/mesh_distance.h"
 
 namespace {
 

@@ -9,8 +9,8 @@
 #include <cstdlib>
 #include <vector>
 
-#include "io/decode_ahead.h"
-#include "io/open_sequence.h"
+#include "io/sequence/decode_ahead.h"
+#include "io/sequence/open_sequence.h"
 
 namespace {
 

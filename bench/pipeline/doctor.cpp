@@ -7,7 +7,7 @@
 
 #include "bench/support/bench.h"
 #include "bench/support/corrupt.h"
-#include "io/doctor.h"
+#include "io/doctor/doctor.h"
 
 namespace fs = std::filesystem;
 using namespace felt;

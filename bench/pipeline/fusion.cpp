@@ -6,8 +6,8 @@
 #include "bench/support/bench.h"
 #include "bench/support/bound.h"
 #include "core/simd.h"
-#include "mapping/tsdf_integrator.h"
-#include "mapping/vdb_state.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/grids/vdb_state.h"
 
 namespace {
 

@@ -8,14 +8,14 @@
 
 #include "bench/support/bench.h"
 #include "core/simd.h"
-#include "io/mesh_io.h"
+#include "io/meshes/mesh_io.h"
 #include "io/simulation/depth_noise.h"
 #include "io/simulation/label_network.h"
-#include "mapping/class_belief.h"
-#include "mapping/marching_cubes.h"
-#include "mapping/mesh_distance.h"
-#include "mapping/surface_color.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/evaluation/mesh_distance.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/labels/class_belief.h"
+#include "mapping/surface/marching_cubes.h"
+#include "mapping/surface/surface_color.h"
 
 namespace {
 

@@ -9,12 +9,12 @@
 #include "bench/support/bench.h"
 #include "core/simd.h"
 #include "io/simulation/label_network.h"
-#include "mapping/class_belief.h"
-#include "mapping/evaluate_predictions.h"
-#include "mapping/label_calibration.h"
-#include "mapping/label_evidence.h"
-#include "mapping/render.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/evaluation/evaluate_predictions.h"
+#include "mapping/fusion/label_evidence.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/labels/class_belief.h"
+#include "mapping/labels/label_calibration.h"
+#include "mapping/surface/render.h"
 
 namespace {
 

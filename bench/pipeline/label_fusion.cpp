@@ -11,8 +11,8 @@
 
 #include "bench/support/bench.h"
 #include "core/simd.h"
-#include "mapping/class_belief.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/labels/class_belief.h"
 
 namespace {
 

@@ -16,8 +16,8 @@
 #include <fstream>
 #include <functional>
 
-#include "io/map_file.h"
-#include "io/map_grids.h"
+#include "io/map_file/map_file.h"
+#include "io/map_file/map_grids.h"
 
 namespace {
 

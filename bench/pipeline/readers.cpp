@@ -8,9 +8,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "bench/support/bench.h"
-#include "io/depth_decode.h"
-#include "io/image_decode.h"
-#include "io/system_memory.h"
+#include "io/files/system_memory.h"
+#include "io/images/depth_decode.h"
+#include "io/images/image_decode.h"
 
 namespace {
 

@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "io/decode_ahead.h"
-#include "io/open_sequence.h"
-#include "io/system_memory.h"
+#include "io/files/system_memory.h"
+#include "io/sequence/decode_ahead.h"
+#include "io/sequence/open_sequence.h"
 
 namespace {
 namespace fs = std::filesystem;

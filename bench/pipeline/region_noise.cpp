@@ -14,9 +14,9 @@
 #include "io/simulation/scene.h"
 #include "io/simulation/touches.h"
 #include "io/simulation/trajectory.h"
-#include "mapping/region_query.h"
-#include "mapping/region_surface.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/regions/region_query.h"
+#include "mapping/regions/region_surface.h"
 
 namespace {
 using namespace felt;

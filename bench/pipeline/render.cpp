@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "bench/support/room.h"
-#include "mapping/render.h"
+#include "mapping/surface/render.h"
 
 namespace {
 using namespace felt;

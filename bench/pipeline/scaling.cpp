@@ -8,9 +8,9 @@
 
 #include "bench/support/bench.h"
 #include "core/simd.h"
-#include "io/plot_svg.h"
+#include "io/pictures/plot_svg.h"
 #include "io/simulation/render_sequence.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/fusion/tsdf_integrator.h"
 
 namespace {
 

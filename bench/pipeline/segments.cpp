@@ -11,10 +11,10 @@
 #include <map>
 
 #include "bench/support/bench.h"
-#include "mapping/frame_segments.h"
-#include "mapping/map_segments.h"
-#include "mapping/segment_voting.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/labels/frame_segments.h"
+#include "mapping/labels/segment_voting.h"
+#include "mapping/regions/map_segments.h"
 
 namespace {
 using namespace felt;

@@ -7,11 +7,11 @@
 
 #include "bench/support/bench.h"
 #include "core/simd.h"
-#include "io/mesh_io.h"
+#include "io/meshes/mesh_io.h"
 #include "io/simulation/render_sequence.h"
-#include "mapping/marching_cubes.h"
-#include "mapping/mesh_distance.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/evaluation/mesh_distance.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/surface/marching_cubes.h"
 
 namespace {
 

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "io/open_sequence.h"
+#include "io/sequence/open_sequence.h"
 
 namespace felt::bench {
 

@@ -4,7 +4,7 @@
 
 #include "bench/support/bench.h"
 #include "core/frame.h"
-#include "mapping/block_store.h"
+#include "mapping/store/block_store.h"
 
 namespace felt::bench {
 

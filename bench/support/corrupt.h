@@ -13,10 +13,11 @@
 #include <string>
 #include <vector>
 
-#include "io/convert.h"
-#include "io/image_encode.h"
-#include "io/open_sequence.h"
-#include "io/trajectory_file.h"
+#include "io/images/depth_encode.h"
+#include "io/images/image_encode.h"
+#include "io/sequence/convert.h"
+#include "io/sequence/open_sequence.h"
+#include "io/sequence/trajectory_file.h"
 
 /// Copies of a sequence with one fault each, for the doctor to name.
 namespace felt::corrupt {

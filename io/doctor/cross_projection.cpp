@@ -6,8 +6,8 @@
 #include <cmath>
 #include <optional>
 
-#include "io/recorded_pose.h"
-#include "io/trajectory_file.h"
+#include "io/sequence/recorded_pose.h"
+#include "io/sequence/trajectory_file.h"
 
 namespace felt {
 namespace {

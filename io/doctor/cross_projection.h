@@ -6,7 +6,7 @@
 
 #include "core/camera.h"
 #include "core/image.h"
-#include "io/sequence_options.h"
+#include "io/sequence/sequence_options.h"
 
 namespace felt {
 

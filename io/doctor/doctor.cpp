@@ -1,4 +1,4 @@
-#include "io/doctor.h"
+#include "io/doctor/doctor.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +13,7 @@
 #include "io/doctor/proposal.h"
 #include "io/doctor/sample.h"
 #include "io/doctor/trajectory_check.h"
-#include "io/open_sequence.h"
+#include "io/sequence/open_sequence.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -77,10 +77,10 @@ Examination examine_sequence(const fs::path& path, const SequenceOptions& option
 }
 
 Examination examine_quickly(const fs::path& path, const SequenceOptions& options) {
-  const SequenceListing listing = list_sequence(path, options);
+  SequenceListing listing = list_sequence(path, options);
   Examination examination = begin(listing);
   if (of_range_sensor(listing)) return examination;
-  const SamplePlan plan{.clusters = 3, .offsets = {0, 2, 6}, .whole_below = 9, .images = true};
+  const SamplePlan plan{.clusters = 3, .offsets = {0, 2, 6}, .whole_below = 9, .whole_trajectory = false};
   const Sample sample = take_sample(path, options, listing, plan);
   examination.sampled_frames = int64_t(sample.geometry.frames.size());
   examination.frame_pairs = int64_t(sample.geometry.pairs.size());

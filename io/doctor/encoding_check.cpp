@@ -5,8 +5,8 @@
 
 #include "core/error.h"
 #include "io/doctor/sample.h"
-#include "io/image_decode.h"
-#include "io/text_input.h"
+#include "io/files/text_input.h"
+#include "io/images/image_decode.h"
 
 namespace felt {
 namespace {

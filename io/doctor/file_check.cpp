@@ -5,7 +5,7 @@
 #include <map>
 #include <system_error>
 
-#include "io/recorded_pose.h"
+#include "io/sequence/recorded_pose.h"
 
 namespace felt {
 namespace fs = std::filesystem;

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "io/doctor/finding.h"
-#include "io/sequence_listing.h"
+#include "io/sequence/sequence_listing.h"
 
 namespace felt {
 

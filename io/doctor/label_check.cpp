@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "io/recorded_pose.h"
+#include "io/sequence/recorded_pose.h"
 
 namespace felt {
 namespace {

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <set>
+#include <utility>
 
-#include "io/listed_sequence.h"
-#include "io/recorded_pose.h"
+#include "io/sequence/listed_sequence.h"
+#include "io/sequence/recorded_pose.h"
 
 namespace felt {
 namespace {
@@ -58,18 +60,18 @@ std::vector<Pair> pairs_of(const std::vector<SampledFrame>& frames, int64_t coun
   return kept;
 }
 
-}  // namespace
-
-RecordedTrajectory recorded_trajectory(const SequenceListing& listing) {
+/// Poses of those of the frames that have one.
+RecordedTrajectory recorded_trajectory(const std::vector<FrameRecord>& frames, const std::vector<int64_t>& positions) {
   RecordedTrajectory trajectory;
   std::vector<double> steps;
-  for (size_t i = 0; i < listing.frames.size(); ++i) {
-    const FrameRecord& frame = listing.frames[i];
+  for (const int64_t i : positions) {
+    const FrameRecord& frame = frames[size_t(i)];
     const auto pose = recorded_pose(frame);
     if (!std::holds_alternative<Eigen::Isometry3d>(pose)) continue;
-    if (!trajectory.stamp.empty() && frame.stamp_s <= trajectory.stamp.back()) continue;
+    if (!std::isfinite(frame.stamp_s) || (!trajectory.stamp.empty() && frame.stamp_s <= trajectory.stamp.back()))
+      continue;
     if (!trajectory.stamp.empty()) steps.push_back(frame.stamp_s - trajectory.stamp.back());
-    trajectory.position.push_back(int64_t(i));
+    trajectory.position.push_back(i);
     trajectory.index.push_back(frame.index);
     trajectory.stamp.push_back(frame.stamp_s);
     trajectory.recorded.push_back(std::get<Eigen::Isometry3d>(pose));
@@ -77,6 +79,17 @@ RecordedTrajectory recorded_trajectory(const SequenceListing& listing) {
   trajectory.spacing = median(steps);
   return trajectory;
 }
+
+/// The listing with some of its frames only. The whole one, which may be large, is not copied meanwhile.
+SequenceListing part_of(SequenceListing& listing, const std::vector<int64_t>& positions) {
+  std::vector<FrameRecord> all = std::exchange(listing.frames, {});
+  SequenceListing part = listing;
+  listing.frames = std::move(all);
+  for (const int64_t i : positions) part.frames.push_back(listing.frames[size_t(i)]);
+  return part;
+}
+
+}  // namespace
 
 std::unique_ptr<SequenceReader> plain_reader(const std::filesystem::path& path, const SequenceOptions& options,
                                              SequenceListing listing, Images images) {
@@ -114,35 +127,40 @@ SampledFrame sampled_frame(Frame frame, int64_t position) {
   return sampled;
 }
 
-Sample take_sample(const std::filesystem::path& path, const SequenceOptions& options, const SequenceListing& listing,
+Sample take_sample(const std::filesystem::path& path, const SequenceOptions& options, SequenceListing& listing,
                    const SamplePlan& plan) {
   Sample sample;
   GeometrySample& geometry = sample.geometry;
-  const auto reader = plain_reader(path, options, listing, plan.images ? Images::depth_and_labels : Images::depth),
-             color_reader = plain_reader(path, options, listing, Images::all);
+  const int64_t count = int64_t(listing.frames.size());
+  const std::vector<int64_t> positions = sampled_positions(count, plan);
+  const SequenceListing sampled = part_of(listing, positions);
+  const auto reader = plain_reader(path, options, sampled, Images::depth_and_labels),
+             color_reader = plain_reader(path, options, sampled, Images::all);
   geometry.camera = reader->info().camera;
   geometry.now.convention = listing.pose_convention;
   geometry.now.ray_length = listing.depth_is_ray_length;
   geometry.depth_scale = listing.depth_scale;
   geometry.stamped = listing.stamped;
-  geometry.trajectory = recorded_trajectory(listing);
+  std::vector<int64_t> posed = positions;
+  if (plan.whole_trajectory) {
+    posed.resize(size_t(count));
+    std::iota(posed.begin(), posed.end(), int64_t(0));
+  }
+  geometry.trajectory = recorded_trajectory(listing.frames, posed);
 
-  const int64_t count = int64_t(listing.frames.size());
-  const std::vector<int64_t> positions = sampled_positions(count, plan);
   std::vector<std::optional<SampledFrame>> frames(positions.size());
   std::vector<std::string> reasons(positions.size());
   // The balance of colours needs some views only, and colour takes longest to decode.
   const size_t color_step = std::max<size_t>(1, positions.size() / kColorFrames);
   tbb::parallel_for(size_t(0), positions.size(), [&](size_t i) {
-    const bool with_color = plan.images && i % color_step == 0;
-    ReadResult result = (with_color ? color_reader : reader)->read(positions[i]);
+    const bool with_color = i % color_step == 0;
+    ReadResult result = (with_color ? color_reader : reader)->read(int64_t(i));
     if (auto* frame = std::get_if<Frame>(&result))
       frames[i] = sampled_frame(std::move(*frame), positions[i]);
     else
       reasons[i] = std::get<SkippedFrame>(result).reason;
   });
   std::vector<double> depths;
-  sample.tried = int64_t(positions.size());
   for (size_t i = 0; i < positions.size(); ++i) {
     if (!frames[i]) {
       ++sample.skipped[reasons[i]];

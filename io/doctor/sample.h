@@ -4,8 +4,8 @@
 #include <string>
 
 #include "io/doctor/geometry.h"
-#include "io/reader.h"
-#include "io/sequence_listing.h"
+#include "io/sequence/reader.h"
+#include "io/sequence/sequence_listing.h"
 
 namespace felt {
 
@@ -15,21 +15,17 @@ struct SamplePlan {
   int clusters = 8;
   std::vector<int> offsets = {0, 1, 3, 9, 27};
   int whole_below = 36;
-  bool images = true;  ///< colour and labels too
+  bool whole_trajectory = true;  ///< poses of all frames, which a search for delays needs, not only of the sampled ones
 };
 
 struct Sample {
   GeometrySample geometry;
   std::map<std::string, int64_t> skipped;  ///< sampled frames that could not be read, by reason
-  int64_t tried = 0;
 };
 
-/// Decodes the sample. `listing`: of all frames.
-Sample take_sample(const std::filesystem::path& path, const SequenceOptions& options, const SequenceListing& listing,
+/// Decodes the sample. `listing`: of all frames; it is as before when this returns.
+Sample take_sample(const std::filesystem::path& path, const SequenceOptions& options, SequenceListing& listing,
                    const SamplePlan& plan);
-
-/// Poses of all frames that have one.
-RecordedTrajectory recorded_trajectory(const SequenceListing& listing);
 
 /// What of a frame is decoded.
 enum class Images { depth, depth_and_labels, all };

@@ -13,7 +13,7 @@
 namespace felt {
 namespace {
 
-/// A pair whose surfaces contradict each other, or that should see each other and does not.
+/// A pair whose frames see each other and whose surfaces mostly meet.
 bool fits(const PairScore& score) { return score.in_view > 0.1 && score.meets > 0.4; }
 
 struct Step {
@@ -38,7 +38,7 @@ std::vector<size_t> largest_steps(const RecordedTrajectory& trajectory) {
   return {chosen.begin(), chosen.end()};
 }
 
-/// Median distance between frames `apart` positions apart, as a share of the median between any two.
+/// Median distance between frames that follow one another, as a share of the median between any two.
 double smoothness(const RecordedTrajectory& trajectory) {
   std::vector<double> near, any;
   const size_t count = trajectory.recorded.size();

@@ -2,7 +2,7 @@
 
 #include "io/doctor/finding.h"
 #include "io/doctor/geometry.h"
-#include "io/reader.h"
+#include "io/sequence/reader.h"
 
 namespace felt {
 

@@ -7,8 +7,8 @@
 #include <set>
 
 #include "core/error.h"
-#include "io/text_input.h"
-#include "io/yaml_problems.h"
+#include "io/files/text_input.h"
+#include "io/files/yaml_problems.h"
 
 namespace felt {
 namespace fs = std::filesystem;

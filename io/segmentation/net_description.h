@@ -52,7 +52,7 @@ ClassTable own_class_table(const NetDescription& net);
 
 /// Slot in `table` of each of the network's classes, ClassTable::kNoSlot where it carries no label: mapped to "none" or
 /// to an ignored class. Throws ConfigError that names every class without a place in the table, and every mapping to a
-/// class that the table lacks or from one that the network lacks.
+/// class that the table lacks.
 std::vector<uint16_t> map_classes(const NetDescription& net, const ClassTable& table);
 
 }  // namespace felt

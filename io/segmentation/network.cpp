@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "io/files/text_input.h"
 #include "io/segmentation/onnx_graph.h"
-#include "io/text_input.h"
 
 namespace felt {
 namespace {

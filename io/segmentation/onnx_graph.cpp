@@ -4,7 +4,7 @@
 #include <set>
 
 #include "core/error.h"
-#include "io/protobuf.h"
+#include "io/files/protobuf.h"
 
 namespace felt {
 namespace {

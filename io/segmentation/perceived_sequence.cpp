@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "mapping/segment_voting.h"
+#include "mapping/labels/segment_voting.h"
 
 namespace felt {
 namespace {
@@ -38,6 +38,7 @@ public:
       info_.classes = perception_.segmenter->classes();
       info_.has_labels = perception_.top == 0;
       info_.has_probabilities = perception_.top > 0;
+      info_.probability_ranks = perception_.top;
     }
     if (perception_.vote == SegmentSource::none) return;
     need(info_.has_labels || info_.has_probabilities, "vote", "a sequence with labels, or a segmenter", "neither");

@@ -5,9 +5,9 @@
 #include <functional>
 #include <memory>
 
-#include "io/reader.h"
 #include "io/segmentation/segment_source.h"
 #include "io/segmentation/segmenter.h"
+#include "io/sequence/reader.h"
 
 namespace felt {
 
@@ -28,7 +28,7 @@ struct Perception {
   int top = 0;                                 ///< probabilities kept of a pixel; 0: a label
   SegmentSource vote = SegmentSource::none;    ///< segments whose pixels are given one class
   FrameSegmentSettings segments;               ///< of `geometric`
-  double least_share = 0.5;  ///< of labels: what the winner of a segment must hold (mapping/segment_voting.h)
+  double least_share = 0.5;  ///< of labels: what the winner of a segment must hold (mapping/labels/segment_voting.h)
   /// By frame number: frames that are not read. They come as skipped, with the reason kAlreadyThere.
   std::function<bool(int64_t)> skip;
   std::shared_ptr<PerceptionTimes> times = std::make_shared<PerceptionTimes>();
@@ -43,8 +43,8 @@ struct Perception {
 /// The sequence with its frames perceived: `read` decodes a frame, runs the segmenter on its colour and replaces its
 /// labels or probabilities, and lets the pixels of each segment vote (probabilities, the segmenter's always, are pooled
 /// before they become labels). As it happens within `read`, it runs ahead of fusion on the threads that decode
-/// (io/decode_ahead.h). Nothing asked for: the sequence itself. `info().classes` is the segmenter's table. Throws
-/// FormatError where the segmenter has no colour to see, the vote no labels, or no instances.
+/// (io/sequence/decode_ahead.h). Nothing asked for: the sequence itself. `info().classes` is the segmenter's table.
+/// Throws FormatError where the segmenter has no colour to see, the vote no labels, or no instances.
 std::unique_ptr<SequenceReader> perceived_sequence(std::unique_ptr<SequenceReader> sequence,
                                                    const Perception& perception);
 

@@ -3,8 +3,8 @@
 #include <optional>
 
 #include "core/frame.h"
-#include "mapping/frame_segments.h"
-#include "mapping/region_query.h"
+#include "mapping/labels/frame_segments.h"
+#include "mapping/regions/region_query.h"
 
 namespace felt {
 

@@ -1,7 +1,6 @@
 #include "io/segmentation/segmenter.h"
 
 #include <algorithm>
-#include <chrono>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -77,9 +76,7 @@ Planes Segmenter::run(const ColorImage& color) const {
     }
   }
   if (!network) network = open_network(model_);
-  const auto start = std::chrono::steady_clock::now();
   Planes output = network->run(input);
-  network_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - start).count();
   const std::scoped_lock lock(mutex_);
   idle_.push_back(std::move(network));
   return output;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -32,9 +31,6 @@ public:
   /// naming the model and the frame where the output holds what no probability or logit can be.
   ProbabilityImage segment(const ColorImage& color, int top, int64_t frame = 0) const;
 
-  /// Time spent within the network, summed over threads.
-  double network_s() const { return 1e-9 * double(network_ns_); }
-
   /// The input of the network for an image: [3, height, width] in its order and normalisation.
   Planes input_of(const ColorImage& color) const;
   /// The network's bare output for an image.
@@ -47,7 +43,6 @@ private:
   std::vector<uint16_t> id_of_target_;  ///< by that number: class id, or kNoLabel for none
   mutable std::mutex mutex_;
   mutable std::vector<std::unique_ptr<Network>> idle_;
-  mutable std::atomic<int64_t> network_ns_ = 0;
 };
 
 /// Ids of the most probable class of each pixel.

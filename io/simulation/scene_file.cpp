@@ -8,8 +8,8 @@
 #include <set>
 
 #include "core/error.h"
+#include "io/files/text_input.h"
 #include "io/simulation/furniture.h"
-#include "io/text_input.h"
 
 namespace felt {
 namespace {

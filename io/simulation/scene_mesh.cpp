@@ -9,7 +9,7 @@
 #include <numbers>
 #include <string>
 
-#include "io/atomic_file.h"
+#include "io/files/atomic_file.h"
 #include "io/simulation/convex_clip.h"
 
 namespace felt {

@@ -1,23 +1,23 @@
 #include "io/simulation/sequence_writer.h"
 
 #include <tbb/parallel_for.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
-#include "io/atomic_file.h"
-#include "io/class_table_file.h"
-#include "io/confusion_file.h"
-#include "io/image_encode.h"
-#include "io/label_images.h"
-#include "io/property_yaml.h"
+#include "io/files/atomic_file.h"
+#include "io/files/folder_in_progress.h"
+#include "io/images/depth_encode.h"
+#include "io/images/image_encode.h"
+#include "io/images/label_images.h"
 #include "io/simulation/scene_file.h"
 #include "io/simulation/scene_mesh.h"
+#include "io/tables/class_table_file.h"
+#include "io/tables/confusion_file.h"
+#include "io/tables/property_yaml.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -36,71 +36,16 @@ std::string formatted(const char* format, Values... values) {
   return text;
 }
 
-/// A folder that takes its final name when it is whole, and disappears otherwise.
-class FolderInProgress {
-public:
-  FolderInProgress(const fs::path& destination, bool replace) : destination_(destination) {
-    if (destination_.filename().empty()) destination_ = destination_.parent_path();  // "name/" is "name"
-    const fs::path parent = destination_.has_parent_path() ? destination_.parent_path() : ".";
-    if (fs::exists(destination_) && !(replace && replaceable()))
-      throw IoError(describe_mismatch(destination_.string(), "output",
-                                      replace ? "an empty folder or a simulated sequence to replace"
-                                              : "a path that does not exist (--force replaces a simulated sequence)",
-                                      "something that exists"));
-    std::string pattern =
-        (parent / fs::path(".").concat(destination_.filename().string()).concat(".partial-XXXXXX")).string();
-    if (mkdtemp(pattern.data()) == nullptr)
-      throw IoError(parent.string() + ": a folder cannot be made in it: " + std::strerror(errno));
-    path_ = pattern;
-    fs::permissions(path_, fs::perms(0755));
-  }
-  ~FolderInProgress() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  FolderInProgress(const FolderInProgress&) = delete;
-  FolderInProgress& operator=(const FolderInProgress&) = delete;
-
-  const fs::path& path() const { return path_; }
-  void commit() {
-    if (!fs::exists(destination_)) {
-      fs::rename(path_, destination_);
-    } else {
-      // The old folder keeps its place until the new one is whole, and gets it back if the new one cannot take it.
-      const fs::path old = fs::path(path_).concat(".old");
-      fs::rename(destination_, old);
-      std::error_code fault, ignored;
-      fs::rename(path_, destination_, fault);
-      if (fault) fs::rename(old, destination_, ignored);
-      if (fault) throw fs::filesystem_error("rename", path_, destination_, fault);
-      fs::remove_all(old, ignored);
-    }
-    path_.clear();
-  }
-
-private:
-  bool replaceable() const {
-    return fs::is_directory(destination_) &&
-           (fs::is_empty(destination_) ||
-            (fs::exists(destination_ / "sequence.yaml") && fs::exists(destination_ / "scene.json")));
-  }
-
-  fs::path destination_, path_;
-};
-
-Image<uint16_t> depth_units(const DepthImage& depth_m, double scale) {
-  Image<uint16_t> units(depth_m.width(), depth_m.height());
-  for (size_t i = 0; i < depth_m.size(); ++i) {
-    const double value = std::round(double(depth_m.data()[i]) * scale);
-    units.data()[i] = value <= 65535 ? uint16_t(value) : 0;  // too far to be stored: not measured
-  }
-  return units;
+/// Whether `folder` may make place: empty, or a simulated sequence.
+bool replaceable(const fs::path& folder) {
+  return fs::is_directory(folder) &&
+         (fs::is_empty(folder) || (fs::exists(folder / "sequence.yaml") && fs::exists(folder / "scene.json")));
 }
 
 std::string sequence_yaml(const SimulationSettings& s, const std::string& root, const std::string& labels,
                           const std::string& classes) {
   const PinholeCamera& c = s.camera;
-  std::string text = "name: " + s.scene.name + "\n";
+  std::string text = "name: " + nlohmann::json(s.scene.name).dump() + "\n";  // a quoted name of YAML, too
   text += formatted("camera: {fx: %.15g, fy: %.15g, cx: %.15g, cy: %.15g, width: %d, height: %d}\n", c.fx, c.fy, c.cx,
                     c.cy, c.width, c.height);
   text += formatted("depth_scale: %.15g\npose_convention: camera-to-world\n", s.depth_scale);
@@ -169,7 +114,8 @@ void write_frame(const SimulationSettings& s, const ClassTable& classes, const f
   const SceneView view = render_view(s.scene, s.camera, s.trajectory[i]);
   const auto png = frame_name(i, ".png");
   const DepthImage depth_m = s.noise ? add_depth_noise(view, s.camera, *s.noise, s.seed, int64_t(i)) : view.depth_m;
-  write_bytes(folder / "depth" / png, encode_png(depth_units(depth_m, s.depth_scale)));
+  int64_t too_far = 0;  // not measured
+  write_bytes(folder / "depth" / png, encode_png(stored_depth(depth_m, s.depth_scale, too_far)));
   if (s.jpeg_color)
     write_bytes(folder / "color" / frame_name(i, ".jpg"), encode_jpeg(view.color));
   else
@@ -191,7 +137,12 @@ bool write_sequence(const SimulationSettings& s, const fs::path& out, bool repla
                     const std::function<bool(int64_t)>& progress) {
   const ClassTable& classes = s.label_set == LabelSet::semantic ? s.scene.semantics : s.scene.materials;
   const char* set_name = s.label_set == LabelSet::semantic ? "semantic" : "material";
-  FolderInProgress folder(out, replace);
+  if (fs::exists(out) && !(replace && replaceable(out)))
+    throw IoError(describe_mismatch(out.string(), "output",
+                                    replace ? "an empty folder or a simulated sequence to replace"
+                                            : "a path that does not exist (--force replaces a simulated sequence)",
+                                    "something that exists"));
+  FolderInProgress folder(out);
   const fs::path& root = folder.path();
   for (const char* part : {"color", "depth", "labels", "instances", "truth/semantic", "truth/material"})
     fs::create_directories(root / part);

@@ -7,7 +7,7 @@
 #include <random>
 #include <sstream>
 
-#include "io/map_file.h"
+#include "io/map_file/map_file.h"
 #include "tests/cli/command.h"
 #include "tests/cli/sequences.h"
 #include "tests/support/data.h"
@@ -172,6 +172,15 @@ TEST_CASE("resuming with another recording or other settings is refused, each na
   CHECK(settings.exit_code == 3);
   CHECK_THAT(settings.err, Catch::Matchers::Contains("max_depth_m: expected 4.0") &&
                                Catch::Matchers::Contains("weight: expected \"constant\""));
+  for (const std::string other_optics : {"distortion", "body-camera", "depth-encoding"}) {
+    const std::string value = other_optics == "distortion"    ? "0.1,0,0,0"
+                              : other_optics == "body-camera" ? "0,0,0.1,0,0,0,1"
+                                                              : "plain";
+    const CommandResult optics = run_feltmap(reconstruct(boxes(), out, "--resume --" + other_optics + " " + value));
+    INFO(other_optics);
+    CHECK(optics.exit_code == 3);
+    CHECK_THAT(optics.err, Catch::Matchers::Contains("--resume"));
+  }
   const CommandResult recording = run_feltmap(reconstruct(other, out, "--resume"));
   CHECK(recording.exit_code == 3);
   CHECK_THAT(recording.err, Catch::Matchers::Contains("recording"));

@@ -9,9 +9,9 @@
 #include <set>
 #include <sstream>
 
-#include "io/map_file.h"
-#include "io/mesh_io.h"
-#include "mapping/touch_update.h"
+#include "io/map_file/map_file.h"
+#include "io/meshes/mesh_io.h"
+#include "mapping/touch/touch_update.h"
 #include "tests/cli/command.h"
 #include "tests/cli/sequences.h"
 #include "tests/support/data.h"

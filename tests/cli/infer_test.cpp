@@ -4,7 +4,7 @@
 #include <sstream>
 
 #include "core/simd.h"
-#include "io/property_yaml.h"
+#include "io/tables/property_yaml.h"
 #include "tests/cli/command.h"
 #include "tests/support/inference_cases.h"
 

@@ -6,9 +6,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "io/image_encode.h"
-#include "io/map_file.h"
-#include "mapping/class_belief.h"
+#include "io/images/image_encode.h"
+#include "io/map_file/map_file.h"
+#include "mapping/labels/class_belief.h"
 #include "tests/cli/command.h"
 #include "tests/support/data.h"
 #include "tests/support/recorded_sequence.h"

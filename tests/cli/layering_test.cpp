@@ -65,6 +65,26 @@ TEST_CASE("a module includes only itself and the modules below it") {
   }
 }
 
+TEST_CASE("a folder of a module includes only those before it") {
+  const std::map<std::string, std::vector<std::string>> folders = {
+      {"mapping", {"store", "labels", "fusion", "regions", "touch", "surface", "grids", "maps", "evaluation"}},
+      {"io",
+       {"files", "images", "tables", "meshes", "sequence", "settings", "segmentation", "pictures", "readings",
+        "map_file", "doctor", "simulation"}}};
+  for (const auto& [module, order] : folders) {
+    std::set<std::string> listed(order.begin(), order.end()), there;
+    for (const auto& entry : fs::directory_iterator(felt::test::source_dir() / module))
+      if (entry.is_directory()) there.insert(entry.path().filename());
+    CHECK(there == listed);
+    for (size_t i = 0; i < order.size(); ++i)
+      for (size_t later = i + 1; later < order.size(); ++later) {
+        INFO(module << "/" << order[i] << " must not know " << order[later]);
+        CHECK(files_including(module + "/" + order[i], "^" + module + "/" + order[later] + "/") == kNone);
+      }
+  }
+  CHECK(files_including("mapping/store", "^mapping/map") == kNone);  // which holds the store
+}
+
 TEST_CASE("core and inference know neither OpenVDB nor OpenCV, and mapping does not know OpenCV") {
   for (const char* module : {"core", "inference"}) CHECK(files_including(module, "^(openvdb|opencv2)/") == kNone);
   CHECK(files_including("mapping", "^opencv2/") == kNone);

@@ -3,7 +3,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "io/map_file.h"
+#include "io/map_file/map_file.h"
 #include "tests/cli/command.h"
 #include "tests/support/data.h"
 #include "tests/support/random_map.h"

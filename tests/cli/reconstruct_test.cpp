@@ -243,6 +243,27 @@ TEST_CASE("a sequence without one usable frame writes nothing and says why") {
   CHECK_FALSE(fs::exists(folder.path() / "out/map.vdb"));
 }
 
+TEST_CASE("a path that is no UTF-8 is as good as any other") {
+  const TemporaryDirectory folder;
+  const fs::path sequence = folder.path() / "b\xe4nke", out = folder.path() / "out";
+  fs::copy(boxes(), sequence, fs::copy_options::recursive);
+  const CommandResult result = reconstruct(sequence, out, "--checkpoint 4 --json");
+  CHECK(result.exit_code == 0);
+  CHECK(nlohmann::json::parse(result.out).at("frames").at("fused") == 12);
+  CHECK(reconstruct(sequence, out, "--resume").exit_code == 0);
+  CHECK(run_feltmap("info " + quoted(sequence) + " --json").exit_code == 0);
+}
+
+TEST_CASE("a file in the place of a folder is a fault of the output") {
+  const TemporaryDirectory folder;
+  std::ofstream(folder.path() / "taken") << "text";
+  REQUIRE(reconstruct(boxes(), folder.path() / "out", "").exit_code == 0);
+  const CommandResult result = run_feltmap("render " + quoted(folder.path() / "out/map.vdb") +
+                                           " --pose 0,0,1,0,0,0,1 --out " + quoted(folder.path() / "taken/views"));
+  CHECK(result.exit_code == 4);
+  CHECK_THAT(result.err, Catch::Matchers::Contains("taken/views"));
+}
+
 TEST_CASE("a map without a surface is said to be one") {
   const TemporaryDirectory folder;
   const CommandResult coarse = reconstruct(boxes(), folder.path() / "coarse", "--voxel-size 50");

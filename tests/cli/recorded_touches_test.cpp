@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "io/atomic_file.h"
-#include "io/map_file.h"
+#include "io/files/atomic_file.h"
+#include "io/map_file/map_file.h"
 #include "tests/cli/command.h"
 #include "tests/support/data.h"
 

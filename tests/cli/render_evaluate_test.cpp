@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "io/map_file.h"
-#include "io/mesh_io.h"
-#include "mapping/marching_cubes.h"
+#include "io/map_file/map_file.h"
+#include "io/meshes/mesh_io.h"
+#include "mapping/surface/marching_cubes.h"
 #include "tests/cli/command.h"
 #include "tests/support/analytic_map.h"
 #include "tests/support/data.h"

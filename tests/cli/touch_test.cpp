@@ -5,10 +5,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
-#include "io/atomic_file.h"
-#include "io/map_file.h"
-#include "io/property_yaml.h"
-#include "mapping/touch_update.h"
+#include "io/files/atomic_file.h"
+#include "io/map_file/map_file.h"
+#include "io/tables/property_yaml.h"
+#include "mapping/touch/touch_update.h"
 #include "tests/cli/command.h"
 #include "tests/support/data.h"
 #include "tests/support/labelled_map.h"

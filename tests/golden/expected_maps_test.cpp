@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "io/map_diff_report.h"
-#include "io/map_file.h"
+#include "io/map_file/map_diff_report.h"
+#include "io/map_file/map_file.h"
 #include "tests/support/data.h"
 
 namespace fs = std::filesystem;

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "inference/decision.h"
-#include "io/property_yaml.h"
-#include "mapping/touch_update.h"
+#include "io/tables/property_yaml.h"
+#include "mapping/touch/touch_update.h"
 #include "tests/support/data.h"
 #include "tests/support/labelled_map.h"
 

@@ -9,17 +9,17 @@
 #include <vector>
 
 #include "inference/decision.h"
-#include "io/open_sequence.h"
+#include "io/sequence/open_sequence.h"
 #include "io/simulation/depth_noise.h"
 #include "io/simulation/label_network.h"
 #include "io/simulation/render_sequence.h"
 #include "io/simulation/scene_file.h"
 #include "io/simulation/touches.h"
 #include "io/simulation/trajectory.h"
-#include "mapping/label_evidence.h"
-#include "mapping/property_view.h"
-#include "mapping/touch_update.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/fusion/label_evidence.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/touch/property_view.h"
+#include "mapping/touch/touch_update.h"
 #include "tests/support/data.h"
 
 using namespace felt;

@@ -8,8 +8,8 @@
 #include <map>
 #include <set>
 
-#include "mapping/survey_kernels.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/fusion/survey_kernels.h"
+#include "mapping/fusion/tsdf_integrator.h"
 #include "tests/support/views.h"
 
 using namespace felt;

@@ -5,9 +5,9 @@
 
 #include <tbb/global_control.h>
 
-#include "mapping/class_belief.h"
-#include "mapping/label_evidence.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/fusion/label_evidence.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/labels/class_belief.h"
 #include "tests/support/simd_targets.h"
 #include "tests/support/views.h"
 

@@ -1,10 +1,10 @@
-#include "mapping/merge.h"
+#include "mapping/maps/merge.h"
 
 #include <catch2/catch.hpp>
 
 #include "core/error.h"
-#include "mapping/map_diff.h"
-#include "mapping/tsdf_integrator.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/maps/map_diff.h"
 #include "tests/support/random_map.h"
 #include "tests/support/views.h"
 

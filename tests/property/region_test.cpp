@@ -11,9 +11,9 @@
 #include <set>
 #include <vector>
 
-#include "mapping/interior_kernels.h"
-#include "mapping/region_query.h"
-#include "mapping/region_surface.h"
+#include "mapping/regions/interior_kernels.h"
+#include "mapping/regions/region_query.h"
+#include "mapping/regions/region_surface.h"
 #include "tests/support/labelled_map.h"
 #include "tests/support/region_voxels.h"
 #include "tests/support/simd_targets.h"

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "io/image_decode.h"
+#include "io/images/image_decode.h"
 
 namespace felt::test {
 

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <fstream>
 
-#include "io/image_encode.h"
+#include "io/images/image_encode.h"
 
 namespace felt::test {
 namespace fs = std::filesystem;

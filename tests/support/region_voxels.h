@@ -2,7 +2,7 @@
 
 #include <set>
 
-#include "mapping/region.h"
+#include "mapping/store/region.h"
 
 namespace felt::test {
 

@@ -1,10 +1,11 @@
-#include "io/convert.h"
+#include "io/sequence/convert.h"
 
 #include <catch2/catch.hpp>
 
 #include "core/error.h"
-#include "io/open_sequence.h"
-#include "io/text_input.h"
+#include "io/files/text_input.h"
+#include "io/images/depth_encode.h"
+#include "io/sequence/open_sequence.h"
 #include "tests/support/data.h"
 #include "tests/support/recorded_sequence.h"
 
@@ -66,6 +67,25 @@ TEST_CASE("conversion leaves nothing behind where it fails or is stopped, and re
   CHECK_THROWS_AS(convert_sequence(*reader, out, {.layout = "nonsense"}), ConfigError);
   CHECK_THROWS_AS(convert_sequence(*reader, folder.path() / "recording", {}), IoError);
   CHECK(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()) == 1);
+  // A folder of the user's whose name looks like one in progress.
+  write_text(folder.path() / "out.partial" / "notes.txt", "mine");
+  convert_sequence(*reader, out, {});
+  CHECK(fs::exists(out / "poses.txt"));
+  CHECK(fs::exists(folder.path() / "out.partial" / "notes.txt"));
+}
+
+TEST_CASE("a conversion keeps stamps where the layout has a place for them, or says that it has none") {
+  TemporaryDirectory folder;
+  write_tum(folder.path() / "recording", 4);
+  const auto reader = open_sequence(folder.path() / "recording");
+  for (const char* layout : {"generic", "tum"}) {
+    CHECK(convert_sequence(*reader, folder.path() / layout, {.layout = layout}).left_out.empty());
+    const auto converted = open_sequence(folder.path() / layout);
+    REQUIRE(converted->size() == 4);
+    for (int64_t i = 0; i < 4; ++i) CHECK(converted->name(i).stamp_s == Approx(reader->name(i).stamp_s).margin(1e-6));
+  }
+  CHECK(convert_sequence(*reader, folder.path() / "icl", {.layout = "icl"}).left_out ==
+        std::vector<std::string>{"stamps"});
 }
 
 TEST_CASE("depth that does not fit into 16 bits is counted and stored as missing") {

@@ -1,4 +1,4 @@
-#include "io/decode_ahead.h"
+#include "io/sequence/decode_ahead.h"
 
 #include <atomic>
 #include <catch2/catch.hpp>

@@ -1,4 +1,4 @@
-#include "io/depth_decode.h"
+#include "io/images/depth_decode.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -7,9 +7,9 @@
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 
-#include "io/image_decode.h"
-#include "io/image_encode.h"
-#include "io/open_sequence.h"
+#include "io/images/image_decode.h"
+#include "io/images/image_encode.h"
+#include "io/sequence/open_sequence.h"
 #include "tests/support/data.h"
 #include "tests/support/image_fault.h"
 #include "tests/support/recorded_sequence.h"

@@ -1,4 +1,4 @@
-#include "io/doctor.h"
+#include "io/doctor/doctor.h"
 
 #include <catch2/catch.hpp>
 

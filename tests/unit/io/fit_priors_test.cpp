@@ -1,4 +1,4 @@
-#include "io/fit_priors.h"
+#include "io/readings/fit_priors.h"
 
 #include <catch2/catch.hpp>
 #include <fstream>

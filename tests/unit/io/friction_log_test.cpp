@@ -1,4 +1,4 @@
-#include "io/friction_log.h"
+#include "io/readings/friction_log.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "core/error.h"
-#include "io/map_file.h"
+#include "io/map_file/map_file.h"
 #include "tests/support/data.h"
 #include "tests/support/random_map.h"
 

@@ -3,9 +3,9 @@
 #include <fstream>
 
 #include "core/error.h"
-#include "io/image_decode.h"
-#include "io/image_encode.h"
-#include "io/open_sequence.h"
+#include "io/images/image_decode.h"
+#include "io/images/image_encode.h"
+#include "io/sequence/open_sequence.h"
 #include "tests/support/data.h"
 #include "tests/support/recorded_sequence.h"
 

@@ -4,7 +4,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "io/mesh_io.h"
+#include "io/meshes/mesh_io.h"
 #include "tests/support/data.h"
 
 using namespace felt;

@@ -1,11 +1,11 @@
-#include "io/image_decode.h"
+#include "io/images/image_decode.h"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <random>
 
-#include "io/image_encode.h"
-#include "io/png_decode.h"
+#include "io/images/image_encode.h"
+#include "io/images/png_decode.h"
 #include "tests/support/image_fault.h"
 
 using namespace felt;

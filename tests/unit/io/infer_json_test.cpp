@@ -1,4 +1,4 @@
-#include "io/infer_json.h"
+#include "io/readings/infer_json.h"
 
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>

@@ -4,12 +4,13 @@
 #include <random>
 
 #include "core/error.h"
-#include "io/class_table_file.h"
-#include "io/image_encode.h"
-#include "io/open_sequence.h"
-#include "io/probability_images.h"
-#include "mapping/map_verify.h"
-#include "mapping/tsdf_integrator.h"
+#include "io/images/image_encode.h"
+#include "io/sequence/open_sequence.h"
+#include "io/sequence/probability_images.h"
+#include "io/tables/class_table_file.h"
+#include "io/tables/confusion_file.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/maps/map_verify.h"
 #include "tests/support/data.h"
 #include "tests/support/recorded_sequence.h"
 
@@ -134,6 +135,16 @@ TEST_CASE("names of a CSV table may hold separators and quotes, between quotes")
         std::vector<std::string>{"door;double door", "chair, office", "12\" pipe"});
   CHECK(names("0;\"a;b\";1;2;3\n1; c ;4;5;6\r\n") == std::vector<std::string>{"a;b", "c"});
   CHECK(names("\"id\",\"name; long\"\n4,d\n5,\"left open\n") == std::vector<std::string>{"d", "left open"});
+}
+
+TEST_CASE("tables that are written read back the same, whatever their names hold") {
+  const TemporaryDirectory folder;
+  const ClassTable table(
+      {{0, "none", {}, true}, {1, "door;double door", {}, false, 1.0 / 3}, {2, "a \"b\", c", {}, false}});
+  write_text(folder.path() / "classes.yaml", class_table_yaml(table));
+  CHECK(read_class_table(folder.path() / "classes.yaml") == table);
+  const std::vector<double> counts = {1, 2, 3, 4};
+  CHECK(parse_confusion_counts(confusion_counts_csv(counts, table), table, "counts.csv") == counts);
 }
 
 TEST_CASE("the table that lies with the labels is theirs") {

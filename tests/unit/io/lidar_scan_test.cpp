@@ -1,4 +1,4 @@
-#include "io/lidar_scan.h"
+#include "io/sequence/lidar_scan.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <fstream>
 
 #include "core/error.h"
-#include "io/image_decode.h"
-#include "io/open_sequence.h"
+#include "io/images/image_decode.h"
+#include "io/sequence/open_sequence.h"
 #include "tests/support/data.h"
 #include "tests/support/recorded_sequence.h"
 

@@ -1,4 +1,4 @@
-#include "io/map_file.h"
+#include "io/map_file/map_file.h"
 
 #include <openvdb/openvdb.h>
 
@@ -71,6 +71,15 @@ TEST_CASE("a loaded map has no plane that the saved one had not, and the other w
   CHECK(loaded.store.get({0, 5, -7})->evidence.size() == 1);
   CHECK(loaded.store.get({1, 5, -7})->evidence.empty());
   CHECK(map_hash(loaded) == map_hash(map));
+}
+
+TEST_CASE("frames may be numbered by nanoseconds") {
+  const test::TemporaryDirectory directory;
+  Map map(0.05, 0.2);
+  for (const int64_t stamp : {1520531829251142058, 1520531829284475391, 1520531829317808724, 1520531830000000001})
+    record_frame(map.frames, "recording", "settings", stamp);
+  save_map(map, directory.path() / "map.vdb");
+  CHECK(load_map(directory.path() / "map.vdb").frames == map.frames);
 }
 
 TEST_CASE("an empty map can be saved and loaded") {

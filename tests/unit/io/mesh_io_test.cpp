@@ -1,4 +1,4 @@
-#include "io/mesh_io.h"
+#include "io/meshes/mesh_io.h"
 
 #include <catch2/catch.hpp>
 #include <cstring>

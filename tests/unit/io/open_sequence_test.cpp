@@ -1,12 +1,12 @@
-#include "io/open_sequence.h"
+#include "io/sequence/open_sequence.h"
 
 #include <catch2/catch.hpp>
 #include <ctime>
 #include <fstream>
 
 #include "core/error.h"
-#include "io/image_encode.h"
-#include "io/trajectory_file.h"
+#include "io/images/image_encode.h"
+#include "io/sequence/trajectory_file.h"
 #include "tests/support/data.h"
 #include "tests/support/recorded_sequence.h"
 
@@ -348,6 +348,33 @@ TEST_CASE("stamps that break the order are as few as can be") {
   CHECK(out_of_order({5, 1, 2, 3}) == std::vector<bool>{true, false, false, false});
   CHECK(out_of_order({1, NAN, 2}) == std::vector<bool>{false, true, false});
   CHECK(out_of_order({}).empty());
+}
+
+TEST_CASE("a pose whose stamp is no number is nobody's, also where stamps are shifted") {
+  TemporaryDirectory folder;
+  write_generic(folder.path(), 3);
+  const std::string matrix = " 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n";
+  write_text(folder.path() / "poses.txt", "nan" + matrix + "0.5" + matrix + "0.6" + matrix);
+  SequenceOptions options;
+  for (const double offset : {0.0, 0.05, -0.05}) {
+    options.pose_stamp_offset = offset;
+    const auto reader = open_sequence(folder.path(), options);
+    CHECK(std::holds_alternative<SkippedFrame>(reader->read(0)));
+  }
+}
+
+TEST_CASE("sizes and numbers beyond all measure are refused, not cut") {
+  TemporaryDirectory folder;
+  write_redwood(folder.path(), 1);
+  for (const char* width : {"1e300", ".nan", "-5"}) {
+    write_text(
+        folder.path() / "intrinsic.json",
+        std::string("{\"width\": ") + width + ", \"height\": 16, \"fx\": 20, \"fy\": 20, \"cx\": 11.5, \"cy\": 7.5}");
+    CHECK_THROWS_WITH(open_sequence(folder.path()), Catch::Contains("intrinsic.json") && Catch::Contains("width"));
+  }
+  write_redwood(folder.path(), 1);
+  write_text(folder.path() / "trajectory.log", "1e300 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+  CHECK_THROWS_WITH(open_sequence(folder.path()), Catch::Contains("trajectory.log:1"));
 }
 
 TEST_CASE("what cannot be opened says what was looked for") {

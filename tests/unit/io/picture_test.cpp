@@ -1,10 +1,10 @@
-#include "io/picture.h"
+#include "io/pictures/picture.h"
 
 #include <catch2/catch.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/error.h"
-#include "mapping/marching_cubes.h"
+#include "mapping/surface/marching_cubes.h"
 #include "tests/support/analytic_map.h"
 #include "tests/support/data.h"
 

@@ -1,4 +1,4 @@
-#include "io/plot_svg.h"
+#include "io/pictures/plot_svg.h"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <limits>
 
-#include "io/infer_plot.h"
+#include "io/readings/infer_plot.h"
 
 namespace felt {
 namespace {

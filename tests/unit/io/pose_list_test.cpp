@@ -1,4 +1,4 @@
-#include "io/pose_list.h"
+#include "io/sequence/pose_list.h"
 
 #include <catch2/catch.hpp>
 #include <fstream>

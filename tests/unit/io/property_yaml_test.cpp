@@ -1,4 +1,4 @@
-#include "io/property_yaml.h"
+#include "io/tables/property_yaml.h"
 
 #include <catch2/catch.hpp>
 

@@ -1,4 +1,4 @@
-#include "io/reconstruct_config.h"
+#include "io/settings/reconstruct_config.h"
 
 #include <catch2/catch.hpp>
 

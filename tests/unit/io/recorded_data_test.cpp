@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "io/open_sequence.h"
+#include "io/sequence/open_sequence.h"
 #include "tests/support/data.h"
 
 using namespace felt;

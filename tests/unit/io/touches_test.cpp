@@ -1,14 +1,14 @@
-#include "io/touches.h"
+#include "io/readings/touches.h"
 
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <optional>
 #include <string>
 
-#include "io/map_file.h"
-#include "io/mask_image.h"
-#include "io/property_yaml.h"
-#include "io/touch_json.h"
+#include "io/map_file/map_file.h"
+#include "io/readings/mask_image.h"
+#include "io/readings/touch_json.h"
+#include "io/tables/property_yaml.h"
 #include "tests/support/data.h"
 #include "tests/support/labelled_map.h"
 

@@ -1,4 +1,4 @@
-#include "io/trajectory_file.h"
+#include "io/sequence/trajectory_file.h"
 
 #include <catch2/catch.hpp>
 

@@ -1,11 +1,11 @@
-#include "io/undistortion.h"
+#include "io/sequence/undistortion.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "core/error.h"
-#include "io/image_encode.h"
-#include "io/open_sequence.h"
+#include "io/images/image_encode.h"
+#include "io/sequence/open_sequence.h"
 #include "tests/support/data.h"
 #include "tests/support/recorded_sequence.h"
 

@@ -1,4 +1,4 @@
-#include "io/vdb_writer.h"
+#include "io/map_file/vdb_writer.h"
 
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
@@ -10,7 +10,7 @@
 #include <iterator>
 #include <random>
 
-#include "io/map_grids.h"
+#include "io/map_file/map_grids.h"
 #include "tests/support/data.h"
 #include "tests/support/random_map.h"
 

@@ -1,9 +1,9 @@
-#include "mapping/block_store.h"
+#include "mapping/store/block_store.h"
 
 #include <catch2/catch.hpp>
 
+#include "mapping/grids/vdb_state.h"
 #include "mapping/map.h"
-#include "mapping/vdb_state.h"
 
 using namespace felt;
 

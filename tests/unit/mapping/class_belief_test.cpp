@@ -1,4 +1,4 @@
-#include "mapping/class_belief.h"
+#include "mapping/labels/class_belief.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>

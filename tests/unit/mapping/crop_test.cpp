@@ -1,4 +1,4 @@
-#include "mapping/crop.h"
+#include "mapping/maps/crop.h"
 
 #include <catch2/catch.hpp>
 

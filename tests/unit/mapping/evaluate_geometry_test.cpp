@@ -1,4 +1,4 @@
-#include "mapping/evaluate_geometry.h"
+#include "mapping/evaluation/evaluate_geometry.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>

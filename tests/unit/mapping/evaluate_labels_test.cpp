@@ -1,11 +1,11 @@
-#include "mapping/evaluate_labels.h"
+#include "mapping/evaluation/evaluate_labels.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "core/error.h"
-#include "mapping/marching_cubes.h"
-#include "mapping/touch_update.h"
+#include "mapping/surface/marching_cubes.h"
+#include "mapping/touch/touch_update.h"
 #include "tests/support/labelled_map.h"
 
 using namespace felt;

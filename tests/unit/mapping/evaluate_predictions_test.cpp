@@ -1,4 +1,4 @@
-#include "mapping/evaluate_predictions.h"
+#include "mapping/evaluation/evaluate_predictions.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "mapping/frame_segments.h"
+#include "mapping/labels/frame_segments.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <limits>
 #include <map>
 
-#include "mapping/frame_segment_kernels.h"
-#include "mapping/segment_voting.h"
+#include "mapping/labels/frame_segment_kernels.h"
+#include "mapping/labels/segment_voting.h"
 #include "tests/support/simd_targets.h"
 #include "tests/support/views.h"
 

@@ -1,4 +1,4 @@
-#include "mapping/label_fusion.h"
+#include "mapping/fusion/label_fusion.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -6,11 +6,11 @@
 #include <map>
 
 #include "core/error.h"
-#include "mapping/class_belief.h"
-#include "mapping/ignored_classes.h"
-#include "mapping/label_evidence.h"
-#include "mapping/tsdf_integrator.h"
-#include "mapping/view_novelty.h"
+#include "mapping/fusion/label_evidence.h"
+#include "mapping/fusion/tsdf_integrator.h"
+#include "mapping/fusion/view_novelty.h"
+#include "mapping/labels/class_belief.h"
+#include "mapping/labels/ignored_classes.h"
 #include "tests/support/views.h"
 
 using namespace felt;

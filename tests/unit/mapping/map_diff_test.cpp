@@ -1,10 +1,10 @@
-#include "mapping/map_diff.h"
+#include "mapping/maps/map_diff.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
 
-#include "mapping/touch_update.h"
+#include "mapping/touch/touch_update.h"
 #include "tests/support/labelled_map.h"
 #include "tests/support/random_map.h"
 

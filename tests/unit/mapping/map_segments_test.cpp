@@ -1,4 +1,4 @@
-#include "mapping/map_segments.h"
+#include "mapping/regions/map_segments.h"
 
 #include <tbb/global_control.h>
 

@@ -1,10 +1,10 @@
-#include "mapping/map_verify.h"
+#include "mapping/maps/map_verify.h"
 
 #include <catch2/catch.hpp>
 #include <functional>
 #include <limits>
 
-#include "mapping/touch_update.h"
+#include "mapping/touch/touch_update.h"
 #include "tests/support/labelled_map.h"
 #include "tests/support/random_map.h"
 

@@ -1,4 +1,4 @@
-#include "mapping/marching_cubes.h"
+#include "mapping/surface/marching_cubes.h"
 
 #include <tbb/global_control.h>
 
@@ -9,7 +9,7 @@
 #include <random>
 #include <set>
 
-#include "mapping/marching_cubes_table.h"
+#include "mapping/surface/marching_cubes_table.h"
 #include "tests/support/analytic_map.h"
 
 using namespace felt;

@@ -1,4 +1,4 @@
-#include "mapping/mesh_distance.h"
+#include "mapping/evaluation/mesh_distance.h"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>

@@ -1,8 +1,8 @@
-#include "mapping/mesh_raster.h"
+#include "mapping/surface/mesh_raster.h"
 
 #include <catch2/catch.hpp>
 
-#include "mapping/marching_cubes.h"
+#include "mapping/surface/marching_cubes.h"
 #include "tests/support/analytic_map.h"
 
 using namespace felt;

@@ -1,4 +1,4 @@
-#include "mapping/region.h"
+#include "mapping/store/region.h"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-#include "mapping/region_query.h"
+#include "mapping/regions/region_query.h"
 #include "tests/support/labelled_map.h"
 #include "tests/support/region_voxels.h"
 

@@ -1,4 +1,4 @@
-#include "mapping/render_classes.h"
+#include "mapping/surface/render_classes.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -1,12 +1,12 @@
-#include "mapping/render.h"
+#include "mapping/surface/render.h"
 
 #include <tbb/global_control.h>
 
 #include <catch2/catch.hpp>
 #include <random>
 
-#include "mapping/marching_cubes.h"
-#include "mapping/mesh_distance.h"
+#include "mapping/evaluation/mesh_distance.h"
+#include "mapping/surface/marching_cubes.h"
 #include "tests/support/analytic_map.h"
 
 using namespace felt;

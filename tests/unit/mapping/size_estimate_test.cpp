@@ -1,8 +1,8 @@
-#include "mapping/size_estimate.h"
+#include "mapping/store/size_estimate.h"
 
 #include <catch2/catch.hpp>
 
-#include "mapping/tsdf_integrator.h"
+#include "mapping/fusion/tsdf_integrator.h"
 
 namespace felt {
 namespace {

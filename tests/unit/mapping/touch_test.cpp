@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "inference/mixture.h"
-#include "mapping/merge.h"
-#include "mapping/touch_mixture.h"
-#include "mapping/touch_update.h"
-#include "mapping/touch_view.h"
+#include "mapping/maps/merge.h"
+#include "mapping/touch/touch_mixture.h"
+#include "mapping/touch/touch_update.h"
+#include "mapping/touch/touch_view.h"
 #include "tests/support/labelled_map.h"
 
 using namespace felt;

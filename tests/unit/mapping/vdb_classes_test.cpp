@@ -1,10 +1,10 @@
-#include "mapping/vdb_classes.h"
+#include "mapping/grids/vdb_classes.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
 
 #include "core/error.h"
-#include "mapping/class_belief.h"
+#include "mapping/labels/class_belief.h"
 #include "tests/support/random_map.h"
 
 using namespace felt;

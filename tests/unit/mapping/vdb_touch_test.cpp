@@ -1,4 +1,4 @@
-#include "mapping/vdb_touch.h"
+#include "mapping/grids/vdb_touch.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "mapping/touch_update.h"
+#include "mapping/touch/touch_update.h"
 #include "tests/support/labelled_map.h"
 
 using namespace felt;

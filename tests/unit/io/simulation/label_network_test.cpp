@@ -7,9 +7,9 @@
 #include <set>
 
 #include "core/error.h"
-#include "io/confusion_file.h"
 #include "io/simulation/furniture.h"
 #include "io/simulation/sequence_writer.h"
+#include "io/tables/confusion_file.h"
 
 using namespace felt;
 

@@ -3,8 +3,8 @@
 #include <catch2/catch.hpp>
 
 #include "core/error.h"
-#include "io/property_yaml.h"
 #include "io/simulation/touches.h"
+#include "io/tables/property_yaml.h"
 #include "tests/support/data.h"
 
 using namespace felt;

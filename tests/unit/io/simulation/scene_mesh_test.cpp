@@ -6,7 +6,7 @@
 #include "io/simulation/convex_clip.h"
 #include "io/simulation/render_scene.h"
 #include "io/simulation/trajectory.h"
-#include "mapping/mesh_distance.h"
+#include "mapping/evaluation/mesh_distance.h"
 #include "tests/support/scenes.h"
 
 using namespace felt;

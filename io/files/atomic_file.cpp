@@ -1,0 +1,119 @@
+#include "io/files/atomic_file.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <utility>
+
+#include "core/error.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+/// Temporary files of a destination begin with this and end with its extension.
+std::string part_prefix(const fs::path& destination) { return destination.stem().string() + ".part-"; }
+
+bool gone(int descriptor) {
+  struct stat status {};
+  return fstat(descriptor, &status) == 0 && status.st_nlink == 0;
+}
+
+}  // namespace
+
+void AtomicFile::fail(const char* step, int error) const {
+  throw IoError(shown_.string() + ": cannot " + step + ": " + std::strerror(error));
+}
+
+AtomicFile::AtomicFile(const fs::path& destination) : shown_(destination), destination_(destination) {
+  if (destination.filename().empty())
+    throw IoError(describe_mismatch(destination.string(), "output", "a file name", "none"));
+  std::error_code error;
+  if (fs::is_symlink(destination, error)) {
+    const fs::path target = fs::weakly_canonical(destination, error);
+    if (!error) destination_ = target;
+  }
+  struct stat existing {};
+  const bool replaces = stat(destination_.c_str(), &existing) == 0;
+  if (replaces && !S_ISREG(existing.st_mode))
+    throw IoError(describe_mismatch(destination.string(), "output", "a regular file or a new name",
+                                    S_ISDIR(existing.st_mode) ? "a folder" : "a special file"));
+  static std::atomic<unsigned> serial = 0;
+  do {
+    fs::path name = part_prefix(destination_);
+    name += std::to_string(getpid());
+    name += "-";
+    name += std::to_string(serial++);
+    name += destination_.extension();
+    temporary_ = destination_.parent_path() / name;
+    descriptor_ = open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    // Whoever tidied up between these two calls took the file: another one, then.
+    if (descriptor_ >= 0 && (flock(descriptor_, LOCK_EX | LOCK_NB), gone(descriptor_))) {
+      close(descriptor_);
+      descriptor_ = -1;
+      errno = EEXIST;
+    }
+  } while (descriptor_ < 0 && errno == EEXIST);
+  if (descriptor_ < 0) fail("create a file beside it", errno);
+  // A replaced file keeps its permissions; where that is not allowed the new file has the default ones.
+  if (replaces) (void)!fchmod(descriptor_, existing.st_mode & 07777);
+}
+
+AtomicFile::~AtomicFile() {
+  if (descriptor_ < 0) return;
+  close(descriptor_);
+  unlink(temporary_.c_str());
+}
+
+void AtomicFile::write(const void* data, size_t bytes) {
+  const char* from = static_cast<const char*>(data);
+  while (bytes > 0) {
+    const ssize_t written = ::write(descriptor_, from, bytes);
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail("write", errno);
+    from += written;
+    bytes -= size_t(written);
+  }
+}
+
+void AtomicFile::commit() {
+  if (fsync(descriptor_) != 0) fail("flush to the disk", errno);
+  if (rename(temporary_.c_str(), destination_.c_str()) != 0) fail("rename into place", errno);
+  // From here on the temporary name is gone: nothing is left to remove.
+  const int file = std::exchange(descriptor_, -1);
+  if (close(file) != 0) fail("close", errno);
+  // Not every file system lets a folder be flushed; the rename itself is done.
+  const fs::path folder = destination_.has_parent_path() ? destination_.parent_path() : fs::path(".");
+  if (const int directory = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); directory >= 0) {
+    (void)!fsync(directory);
+    close(directory);
+  }
+}
+
+void remove_abandoned_parts(const fs::path& destination) {
+  const fs::path folder = destination.has_parent_path() ? destination.parent_path() : fs::path(".");
+  std::error_code fault;
+  for (const auto& entry : fs::directory_iterator(folder, fault)) {
+    const fs::path& path = entry.path();
+    if (!path.filename().string().starts_with(part_prefix(destination)) || path.extension() != destination.extension())
+      continue;
+    const int descriptor = open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    if (descriptor < 0) continue;
+    if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) unlink(path.c_str());
+    close(descriptor);
+  }
+}
+
+void write_file_atomically(const fs::path& destination, std::string_view bytes) {
+  AtomicFile file(destination);
+  file.write(bytes);
+  file.commit();
+}
+
+}  // namespace felt

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+
+namespace felt {
+
+/// A folder that takes its final name when it is whole, and disappears otherwise. Until then it lies beside its
+/// destination under a name that nobody else has.
+class FolderInProgress {
+public:
+  /// Throws IoError where no folder can be made beside `destination`.
+  explicit FolderInProgress(std::filesystem::path destination);
+  ~FolderInProgress();
+  FolderInProgress(const FolderInProgress&) = delete;
+  FolderInProgress& operator=(const FolderInProgress&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  /// What lies at the destination is replaced; whether it may be is the caller's to ask before. Throws IoError, and
+  /// what lay there stays.
+  void commit();
+
+private:
+  std::filesystem::path destination_, path_;
+};
+
+}  // namespace felt

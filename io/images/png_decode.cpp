@@ -1,0 +1,127 @@
+#include "io/images/png_decode.h"
+
+#include <libdeflate.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+
+#include "io/images/image_decode.h"
+
+namespace felt {
+namespace {
+
+constexpr size_t kSignatureBytes = 8, kHeaderEnd = 33;  // signature and IHDR chunk
+constexpr size_t kInterlaceAt = 28;
+
+uint32_t big_endian_32(const uint8_t* p) { return uint32_t(p[0]) << 24 | p[1] << 16 | p[2] << 8 | p[3]; }
+
+ImageError unreadable(const std::string& where, const std::string& expected, const std::string& found) {
+  return ImageError("unreadable", describe_mismatch(where, "PNG", expected, found));
+}
+
+/// The compressed bytes of all IDAT chunks; `joined` holds them where there are several.
+std::span<const uint8_t> image_data(std::span<const uint8_t> png, std::vector<uint8_t>& joined,
+                                    const std::string& where) {
+  std::span<const uint8_t> data;
+  joined.clear();
+  for (size_t at = kSignatureBytes;;) {
+    if (png.size() < at + 12 || png.size() - at - 12 < big_endian_32(&png[at]))
+      throw ImageError("truncated", describe_mismatch(where, "PNG", "an IEND chunk at its end",
+                                                      "the end after " + std::to_string(png.size()) + " bytes"));
+    const size_t length = big_endian_32(&png[at]);
+    const uint8_t* const name = &png[at + 4];
+    if (libdeflate_crc32(0, name, length + 4) != big_endian_32(name + 4 + length))
+      throw unreadable(where, "chunks with right checksums", "a wrong one at byte " + std::to_string(at));
+    if (std::memcmp(name, "IEND", 4) == 0) break;
+    if (std::memcmp(name, "IDAT", 4) == 0) {
+      const std::span<const uint8_t> chunk(name + 4, length);
+      if (data.empty() && joined.empty()) {
+        data = chunk;
+      } else {
+        if (joined.empty()) joined.assign(data.begin(), data.end());
+        joined.insert(joined.end(), chunk.begin(), chunk.end());
+      }
+    }
+    at += length + 12;
+  }
+  return joined.empty() ? data : std::span<const uint8_t>(joined);
+}
+
+/// Paeth's predictor (PNG specification, filter 4): of a left, b above, c above left, the one nearest to a + b - c.
+uint8_t paeth(int a, int b, int c) {
+  const int to_a = std::abs(b - c), to_b = std::abs(a - c), to_c = std::abs(a + b - 2 * c);
+  return uint8_t(to_a <= to_b && to_a <= to_c ? a : to_b <= to_c ? b : c);
+}
+
+/// Adds the prediction of the row's filter to each byte in place. `above` is the unfiltered row above, zeros for the
+/// first. N bytes a pixel, known when compiling, keep the left pixel in registers.
+template <int N>
+void unfilter_row(int filter, uint8_t* row, const uint8_t* above, size_t bytes) {
+  uint8_t left[N] = {}, above_left[N] = {};
+  const size_t whole = bytes - bytes % N;
+  switch (filter) {
+    case 1:
+      for (size_t i = 0; i < whole; i += N)
+        for (int k = 0; k < N; ++k) row[i + k] = left[k] = uint8_t(row[i + k] + left[k]);
+      break;
+    case 2:
+      for (size_t i = 0; i < bytes; ++i) row[i] = uint8_t(row[i] + above[i]);
+      break;
+    case 3:
+      for (size_t i = 0; i < whole; i += N)
+        for (int k = 0; k < N; ++k) row[i + k] = left[k] = uint8_t(row[i + k] + (left[k] + above[i + k]) / 2);
+      break;
+    case 4:
+      for (size_t i = 0; i < whole; i += N)
+        for (int k = 0; k < N; ++k) {
+          row[i + k] = left[k] = uint8_t(row[i + k] + paeth(left[k], above[i + k], above_left[k]));
+          above_left[k] = above[i + k];
+        }
+      break;
+  }
+}
+
+using UnfilterRow = void (*)(int, uint8_t*, const uint8_t*, size_t);
+constexpr UnfilterRow kUnfilterRow[9] = {nullptr, unfilter_row<1>, unfilter_row<2>, unfilter_row<3>, unfilter_row<4>,
+                                         nullptr, unfilter_row<6>, nullptr,         unfilter_row<8>};
+
+}  // namespace
+
+void inflate_zlib(std::span<const uint8_t> packed, std::span<uint8_t> out, const std::string& where) {
+  thread_local const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> inflater(
+      libdeflate_alloc_decompressor(), libdeflate_free_decompressor);
+  const libdeflate_result result =
+      libdeflate_zlib_decompress(inflater.get(), packed.data(), packed.size(), out.data(), out.size(), nullptr);
+  const std::string expected = std::to_string(out.size()) + " bytes of pixels";
+  if (result == LIBDEFLATE_SHORT_OUTPUT)
+    throw ImageError("truncated", describe_mismatch(where, "compressed image", expected, "fewer"));
+  if (result != LIBDEFLATE_SUCCESS)
+    throw ImageError("unreadable", describe_mismatch(where, "compressed image", expected, "damaged or longer data"));
+}
+
+bool has_plain_rows(std::span<const uint8_t> png) { return png.size() >= kHeaderEnd && png[kInterlaceAt] == 0; }
+
+PngRows decode_png_rows(std::span<const uint8_t> png, int height, size_t row_bytes, int pixel_bytes,
+                        std::vector<uint8_t>& buffer, const std::string& where) {
+  thread_local std::vector<uint8_t> joined;
+  const std::span<const uint8_t> packed = image_data(png, joined, where);
+
+  // One row of zeros stands above the first.
+  const size_t stride = row_bytes + 1;
+  buffer.resize(stride * (size_t(height) + 1));
+  std::memset(buffer.data(), 0, stride);
+  uint8_t* const rows = buffer.data() + stride;
+  inflate_zlib(packed, {rows, stride * size_t(height)}, where);
+
+  const UnfilterRow unfilter = kUnfilterRow[pixel_bytes];
+  for (size_t v = 0; v < size_t(height); ++v) {
+    uint8_t* const row = rows + v * stride;
+    if (row[0] > 4)
+      throw unreadable(where, "row filters 0 to 4", std::to_string(row[0]) + " in row " + std::to_string(v));
+    if (row[0] != 0) unfilter(row[0], row + 1, row - stride + 1, row_bytes);
+  }
+  return {rows + 1, stride};
+}
+
+}  // namespace felt

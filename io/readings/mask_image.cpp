@@ -1,0 +1,89 @@
+#include "io/readings/mask_image.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/pose.h"
+#include "io/files/text_input.h"
+#include "io/images/image_decode.h"
+#include "io/sequence/camera_file.h"
+
+namespace felt {
+namespace {
+
+/// 255 where any channel of the image is not zero.
+Image<uint8_t> set_pixels(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  const std::vector<uint8_t> bytes((std::istreambuf_iterator<char>(stream)), {});
+  const ImageHeader header = read_image_header(bytes, file.string());
+  Image<uint8_t> set(header.width, header.height);
+  if (header.format == ImageFormat::png && header.channels == 1) {
+    const Image<uint16_t> values = decode_gray16(bytes, file.string());
+    std::transform(values.begin(), values.end(), set.begin(), [](uint16_t v) { return v != 0 ? 255 : 0; });
+  } else {
+    const ColorImage colors = decode_color(bytes, file.string());
+    std::transform(colors.begin(), colors.end(), set.begin(), [](Rgba8 c) { return c.r | c.g | c.b ? 255 : 0; });
+  }
+  return set;
+}
+
+}  // namespace
+
+ViewMask read_view_mask(const std::filesystem::path& file, const std::vector<double>& intrinsics,
+                        const std::vector<double>& pose) {
+  if (!std::filesystem::is_regular_file(file))
+    throw IoError(describe_mismatch(file.string(), "mask", "a readable image", "none"));
+  const Image<uint8_t> image = set_pixels(file);
+  const auto size_text = [](double w, double h) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%.0f x %.0f", w, h);
+    return std::string(text);
+  };
+  if (intrinsics.size() == 6 && (intrinsics[4] != image.width() || intrinsics[5] != image.height()))
+    throw FormatError(describe_mismatch(file.string(), "size of the mask",
+                                        size_text(intrinsics[4], intrinsics[5]) + " as its camera",
+                                        size_text(image.width(), image.height())));
+  ViewMask view;
+  view.camera = {intrinsics.at(0), intrinsics.at(1), intrinsics.at(2), intrinsics.at(3), image.width(), image.height()};
+  check_camera_fits_image(view.camera, file.string());
+  const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> recorded(pose.data());
+  if (pose.size() != 16 || rigid_pose(recorded, view.T_world_camera) != PoseFault::none)
+    throw ConfigError(describe_mismatch("--pose", "matrix", "a rigid transform", "another"));
+  view.mask = image;
+  return view;
+}
+
+std::vector<Eigen::Vector3d> read_points(const std::filesystem::path& file) {
+  const std::string content = read_file_or_pipe(file);
+  std::vector<Eigen::Vector3d> points;
+  std::vector<std::string> problems;
+  char separator = ',';
+  bool first = true;
+  for (LineReader lines(content, file); lines.next();) {
+    if (first) separator = csv_separator(lines.line());
+    const std::vector<std::string> cells = csv_cells(lines.line(), separator);
+    const bool header = std::exchange(first, false) && cells == std::vector<std::string>{"x", "y", "z"};
+    if (header) continue;
+    Eigen::Vector3d p;
+    bool good = cells.size() == 3;
+    for (size_t i = 0; i < 3 && good; ++i) {
+      const std::optional<double> coordinate = parse_number(cells[i]);
+      good = coordinate.has_value();
+      if (good) p[Eigen::Index(i)] = *coordinate;
+    }
+    if (good)
+      points.push_back(p);
+    else
+      problems.push_back(
+          describe_mismatch(lines.where(), "point", "x,y,z", "'" + std::string(lines.line().substr(0, 60)) + "'"));
+  }
+  if (!problems.empty()) throw FormatError(first_of(problems));
+  return points;
+}
+
+}  // namespace felt

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "mapping/regions/region_query.h"
+
+namespace felt {
+
+/// An image file as a region mask (non-zero in any channel belongs to it), with `intrinsics` fx, fy, cx, cy and, to
+/// be checked against the image, width and height, and `pose` camera to world, 16 numbers row by row. Throws IoError;
+/// FormatError where it is no image, has another size than its camera, or the camera cannot have taken it; ConfigError
+/// where the pose is none.
+ViewMask read_view_mask(const std::filesystem::path& file, const std::vector<double>& intrinsics,
+                        const std::vector<double>& pose);
+
+/// Points from text: one `x,y,z` a line; a header line `x,y,z`, empty lines and lines that start with '#' are skipped.
+/// Throws IoError, and FormatError with the first problem, its line, and how many more.
+std::vector<Eigen::Vector3d> read_points(const std::filesystem::path& file);
+
+}  // namespace felt

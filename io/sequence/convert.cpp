@@ -1,0 +1,240 @@
+#include "io/sequence/convert.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "core/error.h"
+#include "io/files/folder_in_progress.h"
+#include "io/files/text_input.h"
+#include "io/images/depth_encode.h"
+#include "io/images/image_encode.h"
+#include "io/images/label_images.h"
+#include "io/tables/class_table_file.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+/// Where a layout keeps each kind of file, as printf patterns of the frame number; empty: it has no place for it.
+struct FileNames {
+  const char* layout;
+  double depth_scale;  ///< 0: the sequence's own
+  bool counts_from_zero;
+  const char *depth, *color, *labels, *probabilities, *instances, *pose;
+};
+
+constexpr FileNames kLayouts[] = {
+    {"generic", 0, false, "depth/%06lld.png", "color/%06lld", "labels/%06lld.png", "probs/%06lld.png",
+     "instances/%06lld.png", ""},
+    {"7scenes", 1000, false, "seq-01/frame-%06lld.depth.png", "seq-01/frame-%06lld.color",
+     "seq-01/frame-%06lld.label.png", "", "", "seq-01/frame-%06lld.pose.txt"},
+    {"tum", 5000, false, "depth/%06lld.png", "rgb/%06lld", "", "", "", ""},
+    {"replica", 6553.5, true, "results/depth%06lld.png", "results/frame%06lld", "semantic/semantic%06lld.png", "",
+     "instance/instance%06lld.png", ""},
+    {"redwood", 1000, true, "depth/%05lld.png", "color/%05lld", "", "", "", ""},
+    {"icl", 1000, false, "depth/%05lld.png", "color/%05lld", "labels/%05lld.png", "", "", "pose/%05lld.txt"},
+};
+
+std::string named(const char* pattern, int64_t number) {
+  char name[96];
+  std::snprintf(name, sizeof name, pattern, static_cast<long long>(number));
+  return name;
+}
+
+std::string number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.17g", value);
+  return text;
+}
+
+/// The 16 numbers by rows, `between` after each row but the last.
+std::string matrix_text(const Eigen::Isometry3d& T, const char* between) {
+  std::string text;
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column)
+      text += (row + column == 0 ? "" : column == 0 ? between : " ") + number(T.matrix()(row, column));
+  return text;
+}
+
+std::string translation_quaternion_text(const Eigen::Isometry3d& T) {
+  const Eigen::Quaterniond q(T.linear());
+  std::string text;
+  for (const double value : {T.translation().x(), T.translation().y(), T.translation().z(), q.x(), q.y(), q.z(), q.w()})
+    text += (text.empty() ? "" : " ") + number(value);
+  return text;
+}
+
+/// Writes one sequence, frame by frame; the text files come at the end.
+class Writer {
+public:
+  Writer(const FileNames& names, fs::path folder, const SequenceInfo& info, const ConvertOptions& options)
+      : names_(names),
+        folder_(std::move(folder)),
+        info_(info),
+        from_zero_(names.counts_from_zero || options.renumber),
+        jpeg_(options.jpeg_color) {
+    depth_scale_ = options.depth_scale > 0 ? options.depth_scale
+                   : names.depth_scale > 0 ? names.depth_scale
+                                           : info.depth_scale;
+  }
+
+  void add(const Frame& frame, ConvertResult& result) {
+    const auto lost = [&](bool there, const char* pattern, const char* what) {
+      if (there && *pattern == 0 &&
+          std::find(result.left_out.begin(), result.left_out.end(), what) == result.left_out.end())
+        result.left_out.emplace_back(what);
+    };
+    lost(!frame.labels.empty(), names_.labels, "labels");
+    lost(!frame.probabilities.empty(), names_.probabilities, "probabilities");
+    lost(!frame.instances.empty(), names_.instances, "instances");
+    lost(frame.stamp_s != double(frame.index), keeps_stamps() ? "stamps" : "", "stamps");
+    const int64_t i = from_zero_ ? result.written : frame.index;
+    put(named(names_.depth, i), encode_png(stored_depth(frame.depth_m, depth_scale_, result.depth_out_of_range)));
+    const std::string color = named(names_.color, i) + (jpeg_ ? ".jpg" : ".png");
+    if (!frame.color.empty()) put(color, jpeg_ ? encode_jpeg(frame.color) : encode_png(frame.color));
+    if (!frame.labels.empty() && *names_.labels != 0) put(named(names_.labels, i), encode_png(frame.labels));
+    if (!frame.instances.empty() && *names_.instances != 0)
+      put(named(names_.instances, i), encode_png(frame.instances));
+    if (!frame.probabilities.empty() && *names_.probabilities != 0)
+      put(named(names_.probabilities, i), encode_probabilities(frame.probabilities));
+    if (*names_.pose != 0) put(named(names_.pose, i), matrix_text(frame.T_world_camera, "\n") + "\n");
+    if (names_.layout == std::string("tum")) {
+      const std::string stamp = number_with_microseconds(frame.stamp_s);
+      depth_list_ += stamp + " " + named(names_.depth, i) + "\n";
+      if (!frame.color.empty()) color_list_ += stamp + " " + color + "\n";
+      poses_ += stamp + " " + translation_quaternion_text(frame.T_world_camera) + "\n";
+    } else if (names_.layout == std::string("redwood")) {
+      poses_ += std::to_string(i) + " " + std::to_string(i) + " " + std::to_string(i + 1) + "\n" +
+                matrix_text(frame.T_world_camera, "\n") + "\n";
+    } else if (names_.layout == std::string("replica")) {
+      poses_ += matrix_text(frame.T_world_camera, " ") + "\n";
+    } else {
+      const std::string pose = " " + matrix_text(frame.T_world_camera, " ") + "\n";
+      poses_ += std::to_string(i) + pose;
+      stamped_poses_ += number(frame.stamp_s) + pose;
+      has_stamps_ |= frame.stamp_s != std::floor(frame.stamp_s);
+    }
+    ++result.written;
+  }
+
+  void finish() {
+    const PinholeCamera& c = info_.camera;
+    const std::string fx = number(c.fx), fy = number(c.fy), cx = number(c.cx), cy = number(c.cy),
+                      width = std::to_string(c.width), height = std::to_string(c.height), scale = number(depth_scale_);
+    const std::string rows = fx + " 0 " + cx + "\n0 " + fy + " " + cy + "\n0 0 1\n";
+    const std::string layout = names_.layout;
+    if (layout == "generic") {
+      put("sequence.yaml", "camera: {fx: " + fx + ", fy: " + fy + ", cx: " + cx + ", cy: " + cy + ", width: " + width +
+                               ", height: " + height + "}\ndepth_scale: " + scale +
+                               "\npose_convention: camera-to-world\n");
+      put("poses.txt", has_stamps_ ? stamped_poses_ : poses_);
+    } else if (layout == "tum") {
+      put("depth.txt", "# timestamp filename\n" + depth_list_);
+      put("rgb.txt", "# timestamp filename\n" + color_list_);
+      put("groundtruth.txt", "# timestamp tx ty tz qx qy qz qw\n" + poses_);
+      put("camera-intrinsics.txt", rows);
+    } else if (layout == "replica") {
+      put("traj.txt", poses_);
+      put("cam_params.json", "{\"camera\": {\"w\": " + width + ", \"h\": " + height + ", \"fx\": " + fx + ", \"fy\": " +
+                                 fy + ", \"cx\": " + cx + ", \"cy\": " + cy + ", \"scale\": " + scale + "}}\n");
+    } else if (layout == "redwood") {
+      put("trajectory.log", poses_);
+      put("intrinsic.json", "{\"width\": " + width + ", \"height\": " + height + ", \"intrinsic_matrix\": [" + fx +
+                                ", 0, 0, 0, " + fy + ", 0, " + cx + ", " + cy + ", 1]}\n");
+    } else {
+      put(layout == "7scenes" ? "camera-intrinsics.txt" : "intrinsics.txt", rows);
+    }
+    if (!info_.classes.empty()) put("classes.yaml", class_table_yaml(info_.classes));
+  }
+
+  /// The property table and the touches that the sequence carries, as they are; only `generic` has a place for them,
+  /// and touches name frames by their numbers.
+  void add_tables(ConvertResult& result) {
+    const bool generic = names_.layout == std::string("generic");
+    const auto copy = [&](const fs::path& file, const char* name, bool keeps) {
+      if (file.empty()) return;
+      if (keeps)
+        put(name, read_whole_file(file));
+      else
+        result.left_out.push_back(file.filename().string());
+    };
+    copy(info_.properties_file, "properties.yaml", generic);
+    copy(info_.touches_file, "touches.csv", generic && !from_zero_);
+  }
+
+private:
+  bool keeps_stamps() const { return names_.layout == std::string("generic") || names_.layout == std::string("tum"); }
+
+  template <typename Bytes>
+  void put(const std::string& name, const Bytes& bytes) {
+    const fs::path path = folder_ / name;
+    std::error_code fault;
+    fs::create_directories(path.parent_path(), fault);
+    if (fault) throw IoError(path.parent_path().string() + ": cannot be made: " + fault.message());
+    write_bytes(path, {bytes.begin(), bytes.end()});
+  }
+
+  static std::string number_with_microseconds(double value) {
+    char text[48];
+    std::snprintf(text, sizeof text, "%.6f", value);
+    return text;
+  }
+
+  const FileNames& names_;
+  fs::path folder_;
+  const SequenceInfo& info_;
+  bool from_zero_, jpeg_;
+  double depth_scale_ = 0;
+  std::string poses_, stamped_poses_, depth_list_, color_list_;
+  bool has_stamps_ = false;  ///< times, which whole numbers in place of frame numbers would not be taken for
+};
+
+const FileNames& names_of(const std::string& layout) {
+  std::string known;
+  for (const FileNames& names : kLayouts) {
+    if (names.layout == layout) return names;
+    known += (known.empty() ? "" : ", ") + std::string(names.layout);
+  }
+  throw ConfigError(describe_mismatch("--to", "layout", "one of " + known, "'" + layout + "'"));
+}
+
+}  // namespace
+
+std::vector<std::string> writable_layouts() {
+  std::vector<std::string> layouts;
+  for (const FileNames& names : kLayouts) layouts.emplace_back(names.layout);
+  return layouts;
+}
+
+ConvertResult convert_sequence(const SequenceReader& reader, const fs::path& out, const ConvertOptions& options,
+                               const std::function<bool(int64_t)>& progress) {
+  const FileNames& names = names_of(options.layout);
+  if (!(options.depth_scale >= 0 && options.depth_scale <= kMostDepthScale))
+    throw ConfigError(describe_mismatch("--written-depth-scale", "units per metre", "at most 1000000, or 0",
+                                        std::to_string(options.depth_scale)));
+  std::error_code fault;
+  if (fs::exists(out, fault) && !(fs::is_directory(out) && fs::is_empty(out)))
+    throw IoError(describe_mismatch(out.string(), "output", "a folder that does not exist yet", "something there"));
+  FolderInProgress folder(out);
+  ConvertResult result;
+  Writer writer(names, folder.path(), reader.info(), options);
+  for (int64_t i = 0; i < reader.size(); ++i) {
+    const ReadResult read = reader.read(i);
+    if (const auto* skipped = std::get_if<SkippedFrame>(&read))
+      ++result.skipped[skipped->reason];
+    else
+      writer.add(std::get<Frame>(read), result);
+    if (progress && !progress(i + 1)) return {};
+  }
+  if (result.written == 0)
+    throw FormatError(
+        describe_mismatch(reader.info().path.string(), "frames", "at least one that can be read", "none"));
+  writer.finish();
+  writer.add_tables(result);
+  folder.commit();
+  return result;
+}
+
+}  // namespace felt

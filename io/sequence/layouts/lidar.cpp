@@ -1,0 +1,92 @@
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/pose.h"
+#include "io/files/text_input.h"
+#include "io/sequence/layouts.h"
+#include "io/sequence/layouts/file_names.h"
+#include "io/sequence/lidar_scan.h"
+#include "io/sequence/trajectory_file.h"
+
+// Scans of a turning range sensor as KITTI stores them: one file of points each, `poses.txt` with the 12 numbers of a
+// pose a line and, as KITTI's poses are those of its camera 0, `calib.txt` with `Tr:` from the sensor to that camera.
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+fs::path scan_folder(const fs::path& path) { return fs::is_directory(path / "velodyne") ? path / "velodyne" : path; }
+
+std::vector<fs::path> scans_of(const fs::path& path) {
+  if (fs::is_regular_file(path)) return {path};
+  std::vector<fs::path> scans;
+  std::error_code fault;
+  for (fs::directory_iterator at(scan_folder(path), fault), end; !fault && at != end; at.increment(fault))
+    if (at->path().extension() == ".bin") scans.push_back(at->path());
+  // By number where names end in one, else by name.
+  std::sort(scans.begin(), scans.end(), [](const fs::path& a, const fs::path& b) {
+    const auto n = trailing_number(a.stem().string()), m = trailing_number(b.stem().string());
+    return n && m && *n != *m ? *n < *m : a < b;
+  });
+  return scans;
+}
+
+bool recognises(const fs::path& path) {
+  if (fs::is_regular_file(path)) return path.extension() == ".bin";
+  return !scans_of(path).empty();
+}
+
+/// `Tr:` of calib.txt, identity where there is none.
+Eigen::Matrix4d sensor_to_camera(const fs::path& folder) {
+  const fs::path file = folder / "calib.txt";
+  if (!fs::exists(file)) return Eigen::Matrix4d::Identity();
+  const std::string content = read_whole_file(file, 1 << 20);
+  LineReader lines(content, file);
+  while (lines.next()) {
+    if (!lines.line().starts_with("Tr:")) continue;
+    const std::vector<double> numbers = parse_numbers(lines.line().substr(3), lines.where());
+    if (numbers.size() != 12)
+      throw FormatError(describe_mismatch(lines.where(), "Tr", "12 numbers", std::to_string(numbers.size())));
+    return matrix_of_numbers(numbers.data(), 12);
+  }
+  return Eigen::Matrix4d::Identity();
+}
+
+SequenceListing list(const fs::path& path, const SequenceOptions&) {
+  SequenceListing listing;
+  const std::vector<fs::path> scans = scans_of(path);
+  const fs::path folder = fs::is_regular_file(path) ? path.parent_path() : path;
+  std::vector<StampedPose> poses;
+  const fs::path file = fs::is_regular_file(path) ? fs::path() : first_existing(folder, {"poses.txt"});
+  if (!file.empty()) {
+    poses = read_trajectory(file, false);
+    const Eigen::Matrix4d Tr = sensor_to_camera(folder);
+    for (StampedPose& pose : poses) pose.matrix = pose.matrix * Tr;
+  } else {
+    // How the others lie to it nobody knows: they are skipped, and counted, for want of a pose.
+    poses.push_back({0, Eigen::Matrix4d::Identity(), 0});
+    listing.notes.push_back(scans.size() == 1 ? "a single scan without a pose: the sensor is the origin, z up"
+                                              : "no poses.txt: only the first of " + std::to_string(scans.size()) +
+                                                    " scans is used, the sensor is the origin, z up");
+  }
+  for (size_t i = 0; i < scans.size(); ++i)
+    for (int face = 0; face < kScanFaces; ++face) {
+      FrameRecord frame;
+      frame.index = int64_t(i) * kScanFaces + face;
+      frame.stamp_s = double(frame.index);
+      frame.depth = {scans[i], 0, 0, ImageSource::Codec::scan, face};
+      if (i < poses.size()) frame.pose = poses[i].matrix * T_scan_face(face).matrix();
+      listing.frames.push_back(std::move(frame));
+    }
+  const PinholeCamera camera = scan_face_camera();
+  listing.intrinsics = Intrinsics{camera.fx, camera.fy, camera.cx, camera.cy};
+  listing.width = camera.width, listing.height = camera.height;
+  listing.depth_scale = 1;
+  listing.voxel_size_m = 0.2, listing.max_depth_m = 80;
+  return listing;
+}
+
+}  // namespace
+
+const Layout kLidarLayout = {"lidar", "KITTI scans *.bin (one file, or a folder with poses.txt)", recognises, list};
+
+}  // namespace felt

@@ -1,0 +1,78 @@
+#include "core/error.h"
+#include "io/files/text_input.h"
+#include "io/sequence/camera_file.h"
+#include "io/sequence/layouts.h"
+#include "io/sequence/layouts/file_names.h"
+#include "io/sequence/layouts/frame_files.h"
+#include "io/sequence/trajectory_file.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+const std::vector<std::string> kTrajectories = {"trajectory.log", "traj.log", "scene/trajectory.log", "odometry.log"},
+                               kCameras = {"intrinsic.json", "camera_intrinsic.json", "intrinsics.json",
+                                           "intrinsic.txt"};
+
+bool recognises(const fs::path& path) {
+  return !first_existing(path, kTrajectories).empty() && has_depth_files(path / "depth");
+}
+
+/// Open3D's log: per pose a line of three numbers, the first its frame's position, and four lines of a matrix.
+std::vector<StampedPose> read_log(const fs::path& file) {
+  const std::string content = read_whole_file(file);
+  std::vector<StampedPose> poses;
+  LineReader lines(content, file);
+  while (lines.next()) {
+    StampedPose pose;
+    pose.line = lines.number();
+    const std::vector<double> ids = parse_numbers(lines.line(), lines.where());
+    if (ids.size() != 3 || !(ids[0] >= 0 && ids[0] < 1e15))
+      throw FormatError(describe_mismatch(lines.where(), "pose", "a line of three numbers before each matrix",
+                                          std::to_string(ids.size()) + " numbers"));
+    pose.stamp_s = ids[0];
+    for (int row = 0; row < 4; ++row) {
+      const bool more = lines.next();
+      const std::vector<double> numbers = more ? parse_numbers(lines.line(), lines.where()) : std::vector<double>();
+      if (numbers.size() != 4)
+        throw FormatError(describe_mismatch(lines.where(), "row " + std::to_string(row + 1) + " of the matrix",
+                                            "4 numbers",
+                                            more ? std::to_string(numbers.size()) : "the end of the file"));
+      for (int column = 0; column < 4; ++column) pose.matrix(row, column) = numbers[size_t(column)];
+    }
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+SequenceListing list(const fs::path& path, const SequenceOptions& options) {
+  SequenceListing listing;
+  const fs::path log = first_existing(path, kTrajectories);
+  std::map<int64_t, Eigen::Matrix4d> pose_at;
+  for (const StampedPose& pose : read_log(log))
+    if (!pose_at.emplace(int64_t(pose.stamp_s), pose.matrix).second)
+      throw FormatError(describe_mismatch(log.string() + ":" + std::to_string(pose.line), "frame", "each once",
+                                          std::to_string(int64_t(pose.stamp_s)) + " again"));
+  const fs::path color_folder = fs::exists(path / "color") ? path / "color" : path / "image";
+  listing.frames = frame_records(
+      {.depth = depth_files(path / "depth"), .color = numbered_files(color_folder, "", {".jpg", ".png"})});
+  // Colour alone is no frame: the log counts depth images from 0, whatever the first one's number is.
+  std::erase_if(listing.frames, [](const FrameRecord& frame) { return frame.depth.empty(); });
+  for (size_t i = 0; i < listing.frames.size(); ++i)
+    if (const auto found = pose_at.find(int64_t(i)); found != pose_at.end()) listing.frames[i].pose = found->second;
+  if (const fs::path camera = first_existing(path, kCameras); !camera.empty()) {
+    const CameraFile file = read_camera_file(camera);
+    if (!options.intrinsics) listing.intrinsics = file.intrinsics;
+    listing.width = file.width, listing.height = file.height;
+  } else if (!options.intrinsics) {
+    listing.intrinsics = Intrinsics{525, 525, 319.5, 239.5};
+    listing.notes.push_back("no intrinsic.json: Open3D's default camera (525, 525, 319.5, 239.5) is assumed");
+  }
+  return listing;
+}
+
+}  // namespace
+
+const Layout kRedwoodLayout = {"redwood", "depth/N.png and trajectory.log", recognises, list};
+
+}  // namespace felt

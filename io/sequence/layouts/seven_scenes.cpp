@@ -1,0 +1,74 @@
+#include "core/error.h"
+#include "io/sequence/camera_file.h"
+#include "io/sequence/layouts.h"
+#include "io/sequence/layouts/file_names.h"
+#include "io/sequence/layouts/frame_files.h"
+#include "io/tables/class_table_file.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+const std::vector<std::string> kColor = {".color.png", ".color.jpg", ".color.jpeg"}, kPose = {".pose.txt"},
+                               kLabels = {".segm.png", ".label.png"};
+constexpr const char *kPrefix = "frame-", *kDepth = ".depth";
+
+/// The folder that holds the frames: `path` or its only `seq-*`.
+fs::path frame_folder(const fs::path& path) {
+  if (has_depth_files(path, kPrefix, kDepth)) return path;
+  std::vector<fs::path> sequences;
+  std::error_code fault;
+  for (fs::directory_iterator at(path, fault), end; !fault && at != end; at.increment(fault))
+    if (at->path().filename().string().starts_with("seq-") && has_depth_files(at->path(), kPrefix, kDepth))
+      sequences.push_back(at->path());
+  if (sequences.size() > 1)
+    throw FormatError(describe_mismatch(path.string(), "sequence", "one folder seq-*; name the one to read",
+                                        std::to_string(sequences.size()) + " of them"));
+  return sequences.empty() ? fs::path() : sequences.front();
+}
+
+bool recognises(const fs::path& path) {
+  const fs::path folder = frame_folder(path);
+  return !folder.empty() && !fs::exists(folder / "cam.info.txt");  // poses in one file: another layout
+}
+
+SequenceListing list(const fs::path& path, const SequenceOptions& options) {
+  SequenceListing listing;
+  const fs::path folder = frame_folder(path);
+  listing.frames = frame_records({.depth = depth_files(folder, kPrefix, kDepth),
+                                  .color = numbered_files(folder, kPrefix, kColor),
+                                  .labels = numbered_files(folder, kPrefix, kLabels),
+                                  .pose = numbered_files(folder, kPrefix, kPose)});
+  const fs::path above = folder.parent_path();
+  fs::path camera;
+  for (const fs::path& place : {folder, above}) {
+    if (camera.empty()) camera = first_existing(place, {"camera-intrinsics.txt", "camera-intrinsics.color.txt"});
+  }
+  if (!options.intrinsics) {
+    if (!camera.empty()) {
+      listing.intrinsics = read_camera_file(camera).intrinsics;
+    } else {
+      listing.intrinsics = Intrinsics{585, 585, 320, 240};
+      listing.notes.push_back("no camera-intrinsics.txt: the depth camera of 7-Scenes (585, 585, 320, 240) is assumed");
+    }
+  }
+  for (const fs::path& place : {folder, above})
+    if (const fs::path table = first_existing(place, {"classes.yaml"}); !table.empty() && listing.classes.empty())
+      listing.classes = read_class_table(table);
+  // The picking challenge's recordings share these names but rotate the depth bits and count 0.1 mm.
+  if (camera.filename() == "camera-intrinsics.color.txt") {
+    listing.depth_encoding = DepthEncoding::rotated3;
+    listing.depth_scale = 10000;
+    listing.voxel_size_m = 0.005;
+    listing.notes.push_back(
+        "camera-intrinsics.color.txt marks a picking-challenge recording: depth is read as rotated3, 0.1 mm");
+  }
+  return listing;
+}
+
+}  // namespace
+
+const Layout kSevenScenesLayout = {"7scenes", "frame-NNNNNN.depth.png with .pose.txt, here or in seq-*/", recognises,
+                                   list};
+
+}  // namespace felt

@@ -1,0 +1,235 @@
+#include "io/settings/reconstruct_config.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numeric>
+#include <set>
+#include <utility>
+
+#include "core/error.h"
+#include "io/files/text_input.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr size_t kLimitBytes = 1 << 20;
+
+/// Reads one value into the configuration; throws ConfigError with its `where` for a value that cannot be used.
+using ReadValue = std::function<void(const YAML::Node& value, const std::string& where)>;
+
+std::string text_of(const YAML::Node& value, const std::string& where, const std::string& expected) {
+  if (!value.IsScalar() || value.Scalar().empty())
+    throw ConfigError(describe_mismatch(where, "value", expected, value.IsNull() ? "nothing" : "a list or table"));
+  return value.Scalar();
+}
+
+ReadValue number_into(std::optional<double>& target, double least, bool or_equal) {
+  return [&target, least, or_equal](const YAML::Node& value, const std::string& where) {
+    const std::string expected =
+        std::string("a number ") + (or_equal ? "of at least " : "above ") + std::to_string(int(least));
+    const std::string text = text_of(value, where, expected);
+    const auto number = parse_number(text);
+    if (!number || !std::isfinite(*number) || (or_equal ? *number < least : *number <= least))
+      throw ConfigError(describe_mismatch(where, "value", expected, "'" + text + "'"));
+    target = *number;
+  };
+}
+
+ReadValue flag_into(std::optional<bool>& target) {
+  return [&target](const YAML::Node& value, const std::string& where) {
+    bool flag = false;
+    if (!value.IsScalar() || !YAML::convert<bool>::decode(value, flag))
+      throw ConfigError(
+          describe_mismatch(where, "value", "true or false", "'" + text_of(value, where, "true or false") + "'"));
+    target = flag;
+  };
+}
+
+template <typename T>
+ReadValue choice_into(std::optional<T>& target, const std::map<std::string, T>& choices) {
+  return [&target, choices](const YAML::Node& value, const std::string& where) {
+    std::string expected;
+    for (const auto& [name, choice] : choices) expected += (expected.empty() ? "" : ", ") + name;
+    const std::string text = text_of(value, where, "one of " + expected);
+    const auto found = choices.find(text);
+    if (found == choices.end())
+      throw ConfigError(describe_mismatch(where, "value", "one of " + expected, "'" + text + "'"));
+    target = found->second;
+  };
+}
+
+template <typename T>
+ReadValue parsed_into(std::optional<T>& target, T (*parse)(const std::string&, const std::string&)) {
+  return [&target, parse](const YAML::Node& value, const std::string& where) {
+    target = parse(text_of(value, where, "a text"), where);
+  };
+}
+
+ReadValue path_into(fs::path& target, const fs::path& folder) {
+  return [&target, folder](const YAML::Node& value, const std::string& where) {
+    target = folder / text_of(value, where, "a path");
+    if (!fs::exists(target))
+      throw ConfigError(describe_mismatch(where, "path", "an existing file or folder", "'" + target.string() + "'"));
+  };
+}
+
+/// "fx,fy,cx,cy" or a list of four numbers.
+void read_intrinsics_value(std::optional<Intrinsics>& target, const YAML::Node& value, const std::string& where) {
+  std::string text;
+  if (value.IsSequence())
+    for (const YAML::Node& number : value)
+      text += (text.empty() ? "" : ",") + (number.IsScalar() ? number.Scalar() : "?");
+  else
+    text = text_of(value, where, "[fx, fy, cx, cy]");
+  target = parse_intrinsics(text, where);
+}
+
+/// "a,b" or a list of names.
+void read_names(std::vector<std::string>& target, const YAML::Node& value, const std::string& where) {
+  target.clear();
+  if (value.IsSequence()) {
+    for (const YAML::Node& name : value) target.push_back(text_of(name, where, "names of classes"));
+  } else {
+    const std::string text = text_of(value, where, "names of classes");
+    for (const std::string_view name : split_words(text, ',')) target.emplace_back(name);
+  }
+}
+
+std::map<std::string, ReadValue> readers_of(ReconstructConfig& c, const fs::path& folder) {
+  return {
+      {"labels", path_into(c.labels, folder)},
+      {"probs", path_into(c.probs, folder)},
+      {"classes", path_into(c.classes, folder)},
+      {"properties", path_into(c.properties, folder)},
+      {"touches", path_into(c.touches, folder)},
+      {"format",
+       [&c](const YAML::Node& value, const std::string& where) { c.format = text_of(value, where, "a layout"); }},
+      {"frames", parsed_into(c.frames, parse_frame_selection)},
+      {"intrinsics",
+       [&c](const YAML::Node& value, const std::string& where) { read_intrinsics_value(c.intrinsics, value, where); }},
+      {"depth_scale", number_into(c.depth_scale, 0, false)},
+      {"depth_encoding", parsed_into(c.depth_encoding, parse_depth_encoding)},
+      {"ray_length", flag_into(c.ray_length)},
+      {"pose_convention", parsed_into(c.pose_convention, parse_pose_convention)},
+      {"max_dt", number_into(c.max_dt_s, 0, false)},
+      {"color", flag_into(c.color)},
+      {"voxel_size", number_into(c.voxel_size_m, 0, false)},
+      {"truncation",
+       [&c](const YAML::Node& value, const std::string& where) {
+         const std::string text = text_of(value, where, "metres, or voxels as 4vox");
+         parse_truncation(text, 1, where);
+         c.truncation = text;
+       }},
+      {"min_depth", number_into(c.min_depth_m, 0, true)},
+      {"max_depth", number_into(c.max_depth_m, 0, false)},
+      {"max_weight", number_into(c.max_weight, 1, true)},
+      {"dropoff_start", number_into(c.dropoff_start_vox, 0, true)},
+      {"color_band", number_into(c.color_band_vox, 0, true)},
+      {"distance", choice_into<DistanceModel>(c.distance, {{"optical-axis", DistanceModel::optical_axis},
+                                                           {"ray", DistanceModel::ray},
+                                                           {"tangent-plane", DistanceModel::tangent_plane}})},
+      {"weight", choice_into<WeightModel>(c.weight, {{"constant", WeightModel::constant},
+                                                     {"inverse-square", WeightModel::inverse_square},
+                                                     {"sensor-noise", WeightModel::sensor_noise}})},
+      {"carve", flag_into(c.carve)},
+      {"label_band", number_into(c.label_settings.band_vox, 0, false)},
+      {"label_evidence", number_into(c.label_settings.evidence, 0, false)},
+      {"label_cap", number_into(c.label_settings.max_evidence, 0, true)},
+      {"label_novelty", number_into(c.label_settings.novelty_m, 0, true)},
+      {"label_turn", number_into(c.label_settings.novelty_deg, 0, true)},
+      {"class_prior", number_into(c.label_settings.class_prior, 0, false)},
+      {"confusion", path_into(c.label_settings.confusion, folder)},
+      {"ignore_classes", [&c](const YAML::Node& value,
+                              const std::string& where) { read_names(c.label_settings.ignore_classes, value, where); }},
+      {"instances", flag_into(c.label_settings.instances)},
+      {"spread_rest", flag_into(c.label_settings.spread_rest)},
+      {"threads",
+       [&c](const YAML::Node& value, const std::string& where) {
+         const std::string text = text_of(value, where, "a whole number from 1 to 1024");
+         const auto number = parse_integer(text);
+         if (!number || *number < 1 || *number > 1024)
+           throw ConfigError(describe_mismatch(where, "value", "a whole number from 1 to 1024", "'" + text + "'"));
+         c.threads = int(*number);
+       }},
+  };
+}
+
+}  // namespace
+
+double parse_truncation(const std::string& text, double voxel_size_m, const std::string& where) {
+  const bool in_voxels = text.ends_with("vox");
+  const std::string_view number_text(text.data(), text.size() - (in_voxels ? 3 : text.ends_with("m") ? 1 : 0));
+  const auto number = parse_number(number_text);
+  if (!number || !std::isfinite(*number) || *number <= 0)
+    throw ConfigError(describe_mismatch(where, "band around the surface", "metres such as 0.08, or voxels such as 4vox",
+                                        "'" + text + "'"));
+  return in_voxels ? *number * voxel_size_m : *number;
+}
+
+std::string nearest_word(const std::string& word, const std::vector<std::string>& known) {
+  // Levenshtein 1966, one row of the table at a time.
+  const auto distance = [](const std::string& a, const std::string& b) {
+    std::vector<size_t> row(b.size() + 1);
+    std::iota(row.begin(), row.end(), size_t(0));
+    for (size_t i = 1; i <= a.size(); ++i) {
+      size_t diagonal = std::exchange(row[0], i);
+      for (size_t j = 1; j <= b.size(); ++j)
+        diagonal = std::exchange(row[j], std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1])}));
+    }
+    return row.back();
+  };
+  std::string best;
+  size_t least = std::max<size_t>(2, word.size() / 2) + 1;
+  if (word.size() > 64) return best;
+  for (const std::string& candidate : known)
+    if (const size_t d = distance(word, candidate); d < least) least = d, best = candidate;
+  return best;
+}
+
+ReconstructConfig read_reconstruct_config(const fs::path& path) {
+  ReconstructConfig config;
+  const std::string content = read_whole_file(path, kLimitBytes);
+  const std::map<std::string, ReadValue> readers = readers_of(config, path.parent_path());
+  std::vector<std::string> known, problems;
+  for (const auto& [key, reader] : readers) known.push_back(key);
+  const auto line_of = [&](const YAML::Node& node) {
+    return path.string() + ":" + std::to_string(node.Mark().line + 1);
+  };
+  try {
+    const YAML::Node root = YAML::Load(content);
+    if (!root.IsMap() && !root.IsNull())
+      throw ConfigError(describe_mismatch(path.string(), "configuration", "keys and values", "something else"));
+    std::set<std::string> seen;
+    for (const auto& entry : root) {
+      std::string key = entry.first.IsScalar() ? entry.first.Scalar() : std::string();
+      std::replace(key.begin(), key.end(), '-', '_');
+      const auto reader = readers.find(key);
+      if (reader == readers.end()) {
+        const std::string near = nearest_word(key, known);
+        problems.push_back(describe_mismatch(line_of(entry.first), "key",
+                                             near.empty() ? "a known key" : "'" + near + "'", "'" + key + "'"));
+        continue;
+      }
+      if (!seen.insert(key).second) {
+        problems.push_back(describe_mismatch(line_of(entry.first), "key", "each once", "'" + key + "' again"));
+        continue;
+      }
+      try {
+        reader->second(entry.second, line_of(entry.first) + ": " + key);
+      } catch (const ConfigError& fault) {
+        problems.push_back(fault.what());
+      }
+    }
+  } catch (const YAML::Exception& fault) {
+    problems.push_back(path.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
+  }
+  if (!problems.empty()) throw ConfigError(problems);
+  return config;
+}
+
+}  // namespace felt

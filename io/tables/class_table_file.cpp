@@ -1,0 +1,183 @@
+#include "io/tables/class_table_file.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "core/error.h"
+#include "io/files/text_input.h"
+
+namespace felt {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr size_t kLimitBytes = 1 << 24;
+
+struct Table {
+  std::vector<ClassInfo> classes;
+  std::vector<std::string> problems;
+};
+
+bool means_no_class(const std::string& name) {
+  constexpr std::array kNames = {"unknown", "unlabelled", "unlabeled", "none", "void", "background", "ignore"};
+  return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
+}
+
+std::optional<uint16_t> id_of(std::string_view word) {
+  const auto number = parse_integer(word);
+  return number && *number >= 0 && *number <= 0xffff ? std::optional<uint16_t>(uint16_t(*number)) : std::nullopt;
+}
+
+/// A name as YAML reads it back: plain where it is made of letters, digits, blanks, '_' and '-'.
+std::string quoted_name(const std::string& name) {
+  const auto plain = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-' || c == ' '; };
+  const bool letters =
+      std::all_of(name.begin(), name.end(), plain) && std::isalpha(uint8_t(name.front())) && name.back() != ' ';
+  if (letters) return name;
+  std::string text = "'";
+  for (const char c : name) text += c == '\'' ? "''" : std::string(1, c);
+  return text + "'";
+}
+
+std::optional<Rgba8> color_of(const std::vector<std::string>& words) {
+  std::array<uint8_t, 3> channel{};
+  if (words.size() != 3) return std::nullopt;
+  for (size_t i = 0; i < 3; ++i) {
+    const auto number = parse_integer(words[i]);
+    if (!number || *number < 0 || *number > 255) return std::nullopt;
+    channel[i] = uint8_t(*number);
+  }
+  return Rgba8{channel[0], channel[1], channel[2], 255};
+}
+
+std::string scalar_text(const YAML::Node& node) { return node && node.IsScalar() ? node.Scalar() : std::string(); }
+
+void read_yaml_class(const YAML::Node& row, const fs::path& path, Table& table) {
+  const std::string where = path.string() + ":" + std::to_string(row.Mark().line + 1);
+  if (!row.IsMap()) {
+    table.problems.push_back(describe_mismatch(where, "class", "{id, name, color, ignore}", "something else"));
+    return;
+  }
+  ClassInfo info;
+  const int number = int(table.classes.size());
+  const auto id = id_of(scalar_text(row["id"]));
+  if (id)
+    info.id = *id;
+  else
+    table.problems.push_back(
+        describe_mismatch(where, "id", "a number from 0 to 65535", "'" + scalar_text(row["id"]) + "'"));
+  info.name = scalar_text(row["name"]);
+  if (info.name.empty()) table.problems.push_back(describe_mismatch(where, "name", "a name", "none"));
+  info.color = default_class_color(number);
+  if (row["color"]) {
+    std::vector<std::string> words;
+    if (row["color"].IsSequence())
+      for (const YAML::Node& channel : row["color"]) words.push_back(scalar_text(channel));
+    if (const auto color = color_of(words))
+      info.color = *color;
+    else
+      table.problems.push_back(describe_mismatch(where, "color", "[r, g, b] from 0 to 255", "something else"));
+  }
+  if (row["ignore"]) {
+    bool ignore = false;
+    if (YAML::convert<bool>::decode(row["ignore"], ignore))
+      info.ignore = ignore;
+    else
+      table.problems.push_back(
+          describe_mismatch(where, "ignore", "true or false", "'" + scalar_text(row["ignore"]) + "'"));
+  }
+  if (row["prior"]) {
+    const auto prior = parse_number(scalar_text(row["prior"]));
+    if (prior && *prior > 0 && std::isfinite(*prior))
+      info.prior = *prior;
+    else
+      table.problems.push_back(
+          describe_mismatch(where, "prior", "a number above 0", "'" + scalar_text(row["prior"]) + "'"));
+  }
+  for (const auto& entry : row) {
+    const std::string key = scalar_text(entry.first);
+    if (key != "id" && key != "name" && key != "color" && key != "ignore" && key != "prior")
+      table.problems.push_back(describe_mismatch(where, "key", "id, name, color, ignore or prior", "'" + key + "'"));
+  }
+  // A class whose id is unreadable would also be reported as a duplicate of class 0.
+  if (id && !info.name.empty()) table.classes.push_back(info);
+}
+
+Table read_yaml(const fs::path& path, const std::string& content) {
+  Table table;
+  try {
+    const YAML::Node root = YAML::Load(content);
+    if (!root.IsMap() || !root["classes"] || !root["classes"].IsSequence())
+      throw ConfigError(describe_mismatch(path.string(), "classes", "a list under the key 'classes'", "none"));
+    for (const YAML::Node& row : root["classes"]) read_yaml_class(row, path, table);
+  } catch (const YAML::Exception& fault) {
+    throw ConfigError(path.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
+  }
+  return table;
+}
+
+Table read_csv(const fs::path& path, const std::string& content) {
+  Table table;
+  LineReader lines(content, path);
+  bool first = true;
+  char separator = ',';
+  while (lines.next()) {
+    if (first) separator = csv_separator(lines.line());
+    const std::vector<std::string> words = csv_cells(lines.line(), separator);
+    const auto id = id_of(words[0]);
+    const bool header = first && !id;
+    first = false;
+    if (header) continue;
+    if (!id || words.size() < 2 || words[1].empty()) {
+      table.problems.push_back(describe_mismatch(lines.where(), "class", "id" + std::string(1, separator) + "name",
+                                                 "'" + std::string(lines.line().substr(0, 60)) + "'"));
+      continue;
+    }
+    ClassInfo info{*id, words[1], default_class_color(int(table.classes.size())), *id == 0 && means_no_class(words[1])};
+    // Further columns that are no numbers are something else.
+    const auto is_number = [](const std::string& word) { return parse_number(word).has_value(); };
+    if (words.size() >= 5 && std::all_of(words.begin() + 2, words.begin() + 5, is_number)) {
+      if (const auto color = color_of({words[2], words[3], words[4]}))
+        info.color = *color;
+      else
+        table.problems.push_back(describe_mismatch(lines.where(), "color", "r, g, b from 0 to 255",
+                                                   "'" + words[2] + ", " + words[3] + ", " + words[4] + "'"));
+    }
+    table.classes.push_back(info);
+  }
+  return table;
+}
+
+}  // namespace
+
+ClassTable read_class_table(const fs::path& path) {
+  const std::string content = read_whole_file(path, kLimitBytes);
+  require_utf8(content, path.string());
+  Table table = path.extension() == ".csv" ? read_csv(path, content) : read_yaml(path, content);
+  try {
+    ClassTable classes(std::move(table.classes));
+    if (table.problems.empty()) return classes;
+  } catch (const ConfigError& fault) {
+    table.problems.push_back(path.string() + ": " + fault.what());
+  }
+  throw ConfigError(table.problems);
+}
+
+std::string class_table_yaml(const ClassTable& classes) {
+  std::ostringstream text;
+  text << "classes:\n";
+  for (const ClassInfo& c : classes.classes()) {
+    text << "  - {id: " << c.id << ", name: " << quoted_name(c.name) << ", color: [" << int(c.color.r) << ", "
+         << int(c.color.g) << ", " << int(c.color.b) << "]" << (c.ignore ? ", ignore: true" : "");
+    if (c.prior) text << ", prior: " << nlohmann::json(*c.prior).dump();  // every digit: tables are compared
+    text << "}\n";
+  }
+  return text.str();
+}
+
+}  // namespace felt

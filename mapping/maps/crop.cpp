@@ -1,0 +1,98 @@
+#include "mapping/maps/crop.h"
+
+#include "mapping/labels/class_belief.h"
+
+namespace felt {
+namespace {
+
+Eigen::Vector3d center_m(const Map& map, const BlockCoord& coord, int offset) {
+  const Index3 first = first_voxel(coord), local = voxel_of_offset(offset);
+  return Eigen::Vector3d(first.x + local.x, first.y + local.y, first.z + local.z) * map.voxel_size_m;
+}
+
+template <typename Inside>
+Region observed_voxels(const Map& map, const Inside& inside) {
+  Region region;
+  for (const uint32_t number : map.store.sorted()) {
+    const Block& block = map.store[number];
+    BlockMask mask;
+    for (int i = 0; i < kBlockVoxels; ++i)
+      if (block.geometry->weight[i] > 0 && inside(block, i)) mask.set(i);
+    if (mask.any()) region.append(block.coord, mask);
+  }
+  return region;
+}
+
+void copy_observed(const Block& from, const BlockMask& inside, BlockStore& store, Block& to) {
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    if (!inside.test(i)) continue;
+    to.geometry->tsdf[i] = from.geometry->tsdf[i];
+    to.geometry->weight[i] = from.geometry->weight[i];
+  }
+  if (from.color != nullptr) {
+    ColorPlanes& color = store.add_color(to);
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      if (!inside.test(i)) continue;
+      color.r[i] = from.color->r[i], color.g[i] = from.color->g[i], color.b[i] = from.color->b[i];
+      color.count[i] = from.color->count[i];
+    }
+  }
+  const auto copied = [&](const Plane& plane) {
+    Plane* copy = store.new_plane();
+    for (int i = 0; i < kBlockVoxels; ++i)
+      if (inside.test(i)) copy->value[i] = plane.value[i];
+    return copy;
+  };
+  for (const EvidencePlane& evidence : from.evidence) to.evidence.push_back({evidence.slot, copied(*evidence.counts)});
+  if (from.even_evidence != nullptr) to.even_evidence = copied(*from.even_evidence);
+  if (from.instance != nullptr) {
+    InstancePlanes& instance = store.add_instance(to);
+    for (int i = 0; i < kBlockVoxels; ++i)
+      if (inside.test(i)) instance.id[i] = from.instance->id[i], instance.votes[i] = from.instance->votes[i];
+  }
+}
+
+}  // namespace
+
+Region voxels_in(const Map& map, const Eigen::AlignedBox3d& box_m) {
+  return observed_voxels(map, [&](const Block& block, int i) { return box_m.contains(center_m(map, block.coord, i)); });
+}
+
+Region voxels_of_class(const Map& map, int slot) {
+  return observed_voxels(map,
+                         [&](const Block& block, int i) { return class_belief(block, i, map.classes).slot == slot; });
+}
+
+Map cropped(const Map& map, const Region& region) {
+  Map result(map.voxel_size_m, map.truncation_m);
+  result.classes = map.classes;
+  result.properties = map.properties;
+  result.metadata = map.metadata;
+  for (size_t b = 0; b < region.blocks(); ++b) {
+    const Block* block = map.store.get(region.coord[b]);
+    if (block == nullptr) continue;
+    BlockMask inside;
+    for_each_bit(region.mask[b], [&](int i) {
+      if (block->geometry->weight[i] > 0) inside.set(i);
+    });
+    if (inside.any())
+      copy_observed(*block, inside, result.store, result.store[result.store.find_or_create(block->coord)]);
+  }
+  return result;
+}
+
+Map cropped(const Map& map, const Eigen::AlignedBox3d& box_m) { return cropped(map, voxels_in(map, box_m)); }
+
+Eigen::AlignedBox3d observed_bounds(const Map& map) {
+  Eigen::AlignedBox3d bounds;
+  for (const Block& block : map.store.blocks()) {
+    // Most blocks lie inside what is already known.
+    const bool known =
+        bounds.contains(center_m(map, block.coord, 0)) && bounds.contains(center_m(map, block.coord, kBlockVoxels - 1));
+    for (int i = 0; !known && i < kBlockVoxels; ++i)
+      if (block.geometry->weight[i] > 0) bounds.extend(center_m(map, block.coord, i));
+  }
+  return bounds;
+}
+
+}  // namespace felt

@@ -1,0 +1,490 @@
+#include "mapping/regions/region_query.h"
+
+#include <tbb/parallel_for.h>
+#include <array>
+#include <cstdio>
+#include <functional>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <map>
+#include <numbers>
+#include <queue>
+
+#include "mapping/regions/map_segments.h"
+#include "mapping/regions/region_surface.h"
+
+namespace felt {
+namespace {
+
+std::string metres(double x) {
+  char text[32];
+  snprintf(text, sizeof text, "%.3f m", x);
+  return text;
+}
+
+SurfaceRule band_rule(const Map& map, const RegionSettings& settings) {
+  SurfaceRule rule;
+  rule.band_m = float(settings.band_voxels * map.voxel_size_m);
+  rule.min_weight = float(settings.min_weight);
+  rule.voxel_m = float(map.voxel_size_m);
+  return rule;
+}
+
+/// Flood of one region: block by block, each from the bits that reached it.
+class Flood {
+public:
+  Flood(const Map& map, const SurfaceRule& rule) : map_(map), rule_(rule), number_(map.store.size(), kUnknown) {}
+
+  /// Grows from the contact's voxel; returns store numbers of the blocks with a region.
+  Region run(const Index3& seed) {
+    plant(seed);
+    while (!wave_.empty()) {
+      examine_wave();
+      std::vector<uint32_t> current;
+      current.swap(wave_);
+      for (const uint32_t n : current) visit(n);
+    }
+    end_on_planes();
+    return collect();
+  }
+
+private:
+  static constexpr uint32_t kUnknown = 0xffffffff;
+  struct State {
+    uint32_t block;  ///< store number
+    bool examined = false, queued = false;
+    std::array<uint32_t, 27> near;   ///< store numbers of the block's neighbours once it was examined
+    BlockMask pending;               ///< bits that reached the block since its last visit
+    BlockMask reached, grown, open;  ///< candidates that were reached; grown through; the candidates that were not
+    BlockMask region;
+    BlockSurface surface;
+  };
+
+  State& state_of(uint32_t block) {
+    if (number_[block] == kUnknown) {
+      number_[block] = uint32_t(state_.size());
+      state_.emplace_back().block = block;
+    }
+    return state_[number_[block]];
+  }
+
+  void reach(uint32_t block, const BlockMask& bits) {
+    State& state = state_of(block);
+    const BlockMask fresh = bits - state.reached;
+    // Once the block was examined, bits that are no candidates need no visit.
+    if (!(state.examined ? fresh & state.surface.candidate : fresh).any()) return;
+    state.pending |= fresh;
+    if (state.queued) return;
+    state.queued = true;
+    wave_.push_back(number_[block]);
+  }
+
+  /// The contact's voxel and those neighbours whose normals agree with its own: a contact beside a crease is no
+  /// interior voxel, but it belongs to the surface that it lies on.
+  void plant(const Index3& seed) {
+    const Eigen::Vector3f normal = surface_normal(map_, seed, rule_.min_weight);
+    for (int dx = -1; dx <= 1; ++dx)
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dz = -1; dz <= 1; ++dz) {
+          const Index3 v{seed.x + dx, seed.y + dy, seed.z + dz};
+          const uint32_t block = map_.store.find(block_of_voxel(v));
+          if (block == BlockStore::kNone) continue;
+          if (!(v == seed) && surface_normal(map_, v, rule_.min_weight).dot(normal) < rule_.cos_normal_change) continue;
+          BlockMask bit;
+          bit.set(offset_in_block(v));
+          state_of(block).region |= bit;
+          reach(block, bit);
+        }
+  }
+
+  void examine_wave() {
+    std::vector<uint32_t> fresh;
+    for (const uint32_t n : wave_)
+      if (!state_[n].examined) fresh.push_back(n);
+    const auto examine = [&](size_t i) {
+      State& state = state_[fresh[i]];
+      const BlockCoord c = map_.store[state.block].coord;
+      BlockNeighbours near;
+      for (int n = 0; n < 27; ++n) {
+        const uint32_t number =
+            n == 13 ? state.block : map_.store.find({c.x + n / 9 - 1, c.y + n / 3 % 3 - 1, c.z + n % 3 - 1});
+        state.near[size_t(n)] = number;
+        near[size_t(n)] = number == BlockStore::kNone ? nullptr : &map_.store[number];
+      }
+      state.surface = examine_block(near, rule_);
+      state.examined = true;
+    };
+    if (fresh.size() < 16) {
+      for (size_t i = 0; i < fresh.size(); ++i) examine(i);
+    } else {
+      tbb::parallel_for(size_t(0), fresh.size(), examine);
+    }
+  }
+
+  void visit(uint32_t n) {
+    State& state = state_[n];
+    state.queued = false;
+    state.reached |= state.pending & state.surface.candidate;
+    BlockMask grown = (state.pending & state.surface.interior) - state.grown;
+    state.pending = {};
+    if (!grown.any()) return;
+    for (BlockMask last; !(last == grown);) {
+      last = grown;
+      grown |= dilated_inside(grown) & state.surface.interior;
+    }
+    grown -= state.grown;
+    state.grown |= grown;
+    const std::array<BlockMask, 27> reached = dilated(grown);
+    state.reached |= reached[13] & state.surface.candidate;
+    for (size_t i = 0; i < reached.size(); ++i)
+      if (i != 13 && state.near[i] != BlockStore::kNone && reached[i].any()) reach(state.near[i], reached[i]);
+  }
+
+  /// Adds what the region grew through and the candidates around that lie on its planes.
+  void end_on_planes() {
+    std::vector<uint32_t> grown;
+    for (uint32_t n = 0; n < state_.size(); ++n) {
+      State& state = state_[n];
+      state.region &= state.surface.candidate;  // the contact and what is beside it
+      state.region |= state.grown;
+      if (state.grown.any()) grown.push_back(n);
+    }
+    // Blocks that no voxel reached may hold some that end the region.
+    for (const uint32_t n : grown)
+      for (size_t i = 0; i < 27; ++i)
+        if (const uint32_t block = state_[n].near[i]; block != BlockStore::kNone && number_[block] == kUnknown)
+          if (lies_near(state_[n].grown, int(i)))
+            state_of(block).surface.candidate = candidates(map_.store[block], rule_);
+    for (State& state : state_) state.open = state.surface.candidate - state.grown;
+    std::vector<std::vector<std::pair<uint32_t, BlockMask>>> joined(grown.size());
+    const auto end = [&](size_t g) {
+      const State& state = state_[grown[g]];
+      BlockNeighbours near{};
+      std::array<const BlockMask*, 27> open{};
+      bool any = false;
+      for (size_t i = 0; i < 27; ++i) {
+        if (state.near[i] == BlockStore::kNone) continue;
+        near[i] = &map_.store[state.near[i]];
+        if (number_[state.near[i]] == kUnknown || !state_[number_[state.near[i]]].open.any()) continue;
+        open[i] = &state_[number_[state.near[i]]].open;
+        any = true;
+      }
+      if (!any) return;
+      const std::array<BlockMask, 27> found = on_planes_of(near, state.grown, open, rule_);
+      for (size_t i = 0; i < 27; ++i)
+        if (found[i].any()) joined[g].emplace_back(number_[state.near[i]], found[i]);
+    };
+    if (grown.size() < 16) {
+      for (size_t g = 0; g < grown.size(); ++g) end(g);
+    } else {
+      tbb::parallel_for(size_t(0), grown.size(), end);
+    }
+    for (const auto& some : joined)
+      for (const auto& [n, bits] : some) state_[n].region |= bits;
+  }
+
+  /// Whether a bit of the mask lies within kCollar voxels of the neighbour block at offset i (as in BlockNeighbours).
+  static bool lies_near(const BlockMask& mask, int i) {
+    const auto end = [](int step, uint64_t low, uint64_t high) {
+      return step < 0 ? low : step > 0 ? high : ~uint64_t(0);
+    };
+    constexpr uint64_t kLowZ = 0x0303030303030303, kHighZ = 0xc0c0c0c0c0c0c0c0, kLowY = 0xffff,
+                       kHighY = 0xffff000000000000;
+    static_assert(kCollar == 2);
+    const int dx = i / 9 - 1;
+    const uint64_t side = end(i / 3 % 3 - 1, kLowY, kHighY) & end(i % 3 - 1, kLowZ, kHighZ);
+    uint64_t any = 0;
+    for (int x = dx > 0 ? 6 : 0; x < (dx < 0 ? 2 : 8); ++x) any |= mask.word[size_t(x)];
+    return (any & side) != 0;
+  }
+
+  Region collect() const {
+    std::vector<const State*> found;
+    for (const State& state : state_)
+      if (state.region.any()) found.push_back(&state);
+    const auto coord = [&](const State* state) { return map_.store[state->block].coord; };
+    std::sort(found.begin(), found.end(), [&](const State* a, const State* b) { return coord(a) < coord(b); });
+    Region region;
+    for (const State* state : found) region.append(coord(state), state->region);
+    return region;
+  }
+
+  const Map& map_;
+  const SurfaceRule rule_;
+  std::vector<uint32_t> number_;  ///< by store number: index of its state
+  std::deque<State> state_;       ///< never moved
+  std::vector<uint32_t> wave_;
+};
+
+/// Keeps the voxels of a connected region within `radius_voxels` of the seed along the region (Dijkstra over
+/// 26-neighbours with steps 1, sqrt 2, sqrt 3; an overestimate of the geodesic by at most 8 %).
+Region within_geodesic(const Region& region, const Index3& seed, double radius_voxels) {
+  struct Reach {
+    float distance;
+    Index3 voxel;
+    bool operator>(const Reach& o) const { return distance > o.distance; }
+  };
+  std::vector<std::array<float, kBlockVoxels>> distance(region.blocks());
+  for (auto& d : distance) d.fill(std::numeric_limits<float>::infinity());
+  const auto slot_of = [&](const Index3& v) -> float* {
+    const BlockMask* bits = region.find(block_of_voxel(v));
+    if (bits == nullptr || !bits->test(offset_in_block(v))) return nullptr;
+    return &distance[size_t(bits - region.mask.data())][size_t(offset_in_block(v))];
+  };
+  std::priority_queue<Reach, std::vector<Reach>, std::greater<>> queue;
+  *slot_of(seed) = 0;
+  queue.push({0, seed});
+  while (!queue.empty()) {
+    const Reach r = queue.top();
+    queue.pop();
+    if (r.distance > *slot_of(r.voxel)) continue;
+    for (int dx = -1; dx <= 1; ++dx)
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dz = -1; dz <= 1; ++dz) {
+          const Index3 v{r.voxel.x + dx, r.voxel.y + dy, r.voxel.z + dz};
+          float* known = slot_of(v);
+          const float d = r.distance + std::sqrt(float(dx * dx + dy * dy + dz * dz));
+          if (known == nullptr || d > radius_voxels || d >= *known) continue;
+          *known = d;
+          queue.push({d, v});
+        }
+  }
+  Region near;
+  for (size_t b = 0; b < region.blocks(); ++b) {
+    BlockMask bits;
+    for_each_bit(region.mask[b], [&](int i) {
+      if (distance[b][size_t(i)] <= radius_voxels) bits.set(i);
+    });
+    if (bits.any()) near.append(region.coord[b], bits);
+  }
+  return near;
+}
+
+Region surface_blocks(const Map& map, const SurfaceRule& rule) {
+  const std::vector<uint32_t> order = map.store.sorted();
+  std::vector<BlockMask> masks(order.size());
+  tbb::parallel_for(size_t(0), order.size(), [&](size_t n) { masks[n] = candidates(map.store[order[n]], rule); });
+  Region region;
+  for (size_t n = 0; n < order.size(); ++n)
+    if (masks[n].any()) region.append(map.store[order[n]].coord, masks[n]);
+  return region;
+}
+
+void limit_color(const Map& map, const Index3& voxel, double change, SurfaceRule& rule) {
+  const Block& block = *map.store.get(block_of_voxel(voxel));
+  const int i = offset_in_block(voxel);
+  if (block.color == nullptr || block.color->count[i] == 0)
+    throw TouchError("region: colour limit: expected a coloured contact, found none there");
+  rule.limit_color = true;
+  rule.color[0] = block.color->r[i] / 256.0f;
+  rule.color[1] = block.color->g[i] / 256.0f;
+  rule.color[2] = block.color->b[i] / 256.0f;
+  rule.color_change = float(change);
+}
+
+bool map_has_labels(const Map& map) {
+  return std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
+                     [](const Block& b) { return !b.evidence.empty(); });
+}
+
+/// Calls `visit(block, offset)` for the voxels of the surface band within two voxels of the contact.
+template <typename Visit>
+void for_each_near(const Map& map, const Index3& centre, const SurfaceRule& band, const Visit& visit) {
+  for (int dx = -2; dx <= 2; ++dx)
+    for (int dy = -2; dy <= 2; ++dy)
+      for (int dz = -2; dz <= 2; ++dz) {
+        const Index3 v{centre.x + dx, centre.y + dy, centre.z + dz};
+        const Block* block = map.store.get(block_of_voxel(v));
+        const int i = offset_in_block(v);
+        if (block != nullptr && block->geometry->weight[i] >= band.min_weight &&
+            std::abs(block->geometry->tsdf[i]) <= band.band_m)
+          visit(*block, i);
+      }
+}
+
+/// Strongest class there, -1 where there is no evidence.
+int contact_class(const Map& map, const Index3& centre, const SurfaceRule& band) {
+  std::vector<double> sum(size_t(std::max(1, map.classes.size())), 0.0);
+  for_each_near(map, centre, band, [&](const Block& block, int i) {
+    for (const EvidencePlane& e : block.evidence)
+      if (e.slot < sum.size()) sum[e.slot] += e.counts->value[i];
+  });
+  const auto best = std::max_element(sum.begin(), sum.end());
+  return *best > 0 ? int(best - sum.begin()) : -1;
+}
+
+/// The thing that most of these voxels belong to, the lowest id of equals. Throws TouchError where there is none.
+uint16_t contact_instance(const Map& map, const Index3& centre, const SurfaceRule& band) {
+  std::map<uint16_t, int> voxels;
+  for_each_near(map, centre, band, [&](const Block& block, int i) {
+    if (block.instance != nullptr && block.instance->votes[i] > 0) ++voxels[block.instance->id[i]];
+  });
+  voxels.erase(0);
+  const auto most =
+      std::max_element(voxels.begin(), voxels.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (most != voxels.end()) return most->first;
+  const bool any = std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
+                               [](const Block& b) { return b.instance != nullptr; });
+  throw TouchError(describe_mismatch("region instance", "contact",
+                                     any ? "a surface that belongs to a thing" : "a map with instance ids",
+                                     any ? "one without an instance id" : "none (reconstruct --instances)"));
+}
+
+/// The contact's segment of the map, cut to `within`.
+Region segment_around(const Map& map, const Contact& contact, const RegionSettings& settings, const Region& within) {
+  for (const Region& segment : map_segments(map, map_segment_settings(settings)))
+    if (segment.contains(contact.voxel)) return intersected(segment, within);
+  throw TouchError("region segment: contact: expected a surface that is part of a segment, found a piece too small");
+}
+
+/// Says what is at a point that is too far from every surface.
+[[noreturn]] void fail_to_snap(const Map& map, const Eigen::Vector3d& p, const std::string& where, double radius_m) {
+  const std::string expected = "observed surface within " + metres(radius_m);
+  const Eigen::Vector3d q = p / map.voxel_size_m;
+  const Index3 v{int32_t(std::lround(q.x())), int32_t(std::lround(q.y())), int32_t(std::lround(q.z()))};
+  const Block* block = map.store.get(block_of_voxel(v));
+  if (block != nullptr && block->geometry->weight[offset_in_block(v)] > 0) {
+    const double d = block->geometry->tsdf[offset_in_block(v)];
+    throw TouchError(describe_mismatch(where, "contact", expected,
+                                       d > 0 ? "free space (signed distance " + metres(d) + ")"
+                                             : "the inside of something (signed distance " + metres(d) + ")"));
+  }
+  Eigen::Array3d lo = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
+  for (const Block& b : map.store.blocks()) {
+    const Eigen::Array3d first(b.coord.x * 8.0, b.coord.y * 8.0, b.coord.z * 8.0);
+    lo = lo.min(first - 0.5);
+    hi = hi.max(first + 7.5);
+  }
+  const bool outside = map.store.empty() || (q.array() < lo).any() || (q.array() > hi).any();
+  throw TouchError(
+      describe_mismatch(where, "contact", expected, outside ? "a point outside the map" : "unobserved space"));
+}
+
+}  // namespace
+
+Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const RegionSettings& settings) {
+  char where[96];
+  snprintf(where, sizeof where, "point (%.3f, %.3f, %.3f)", point_m.x(), point_m.y(), point_m.z());
+  const Eigen::Vector3d q = point_m / map.voxel_size_m;
+  if (!q.allFinite() || q.array().abs().maxCoeff() > 1e9)
+    throw TouchError(
+        describe_mismatch(where, "contact", "three finite coordinates inside the map", std::string(where).substr(6)));
+  const SurfaceRule band = band_rule(map, settings);
+  const double radius = settings.snap_voxels;
+  const auto lo = [&](double x) { return int32_t(std::ceil(x - radius)); };
+  const auto hi = [&](double x) { return int32_t(std::floor(x + radius)); };
+  Contact contact;
+  contact.point_m = point_m;
+  // Distance to the surface through a voxel's centre: the nearest zero crossing, not the nearest band voxel.
+  double best = std::numeric_limits<double>::infinity();
+  for (int32_t x = lo(q.x()); x <= hi(q.x()); ++x)
+    for (int32_t y = lo(q.y()); y <= hi(q.y()); ++y)
+      for (int32_t z = lo(q.z()); z <= hi(q.z()); ++z) {
+        const Block* block = map.store.get(block_of_voxel({x, y, z}));
+        const int i = offset_in_block({x, y, z});
+        if (block == nullptr || block->geometry->weight[i] < band.min_weight) continue;
+        const double tsdf = std::abs(double(block->geometry->tsdf[i]));
+        const Eigen::Vector3d centre(x, y, z);
+        const double from_point = (centre - q).norm();
+        if (tsdf > band.band_m || from_point > radius) continue;
+        const double cost = from_point * from_point + tsdf * tsdf / (map.voxel_size_m * map.voxel_size_m);
+        if (cost >= best) continue;
+        best = cost;
+        contact.voxel = {x, y, z};
+      }
+  if (!std::isfinite(best)) fail_to_snap(map, point_m, where, radius * map.voxel_size_m);
+  contact.normal = surface_normal(map, contact.voxel, band.min_weight).cast<double>();
+  const Block& block = *map.store.get(block_of_voxel(contact.voxel));
+  contact.surface_m = Eigen::Vector3d(contact.voxel.x, contact.voxel.y, contact.voxel.z) * map.voxel_size_m -
+                      double(block.geometry->tsdf[offset_in_block(contact.voxel)]) * contact.normal;
+  contact.distance_m = (contact.surface_m - point_m).norm();
+  contact.slot = contact_class(map, contact.voxel, band);
+  if (contact.slot < 0 && map_has_labels(map))
+    throw TouchError(describe_mismatch(where, "contact", "a surface with a class",
+                                       "one without labels (an ignored class, or never labelled)"));
+  return contact;
+}
+
+double normal_limit_deg(const Map& map, const Contact& contact, const RegionSettings& settings) {
+  constexpr double kNoises = 3, kMostDeg = 30;
+  if (settings.normal_change_deg >= kMostDeg) return settings.normal_change_deg;
+  const double noise_deg = normal_noise_deg(map, contact.voxel, band_rule(map, settings));
+  return std::max(settings.normal_change_deg, std::min(kNoises * noise_deg, kMostDeg));
+}
+
+Region find_region(const Map& map, const Contact& contact, const RegionSettings& settings) {
+  validate(settings);
+  SurfaceRule rule = band_rule(map, settings);
+  rule.centre = contact.voxel;
+  rule.radius_voxels = float(settings.radius_m / map.voxel_size_m);
+  if (settings.rule == RegionRule::sphere) return surface_blocks(map, rule);
+  if (settings.rule == RegionRule::instance) {
+    rule.instance = contact_instance(map, contact.voxel, rule);
+    return surface_blocks(map, rule);
+  }
+  if (settings.rule == RegionRule::segment) return segment_around(map, contact, settings, surface_blocks(map, rule));
+  if (settings.rule != RegionRule::connected)
+    throw TouchError(
+        describe_mismatch("region", "rule", "connected, sphere, instance or segment", rule_name(settings.rule)));
+  rule.slot = contact.slot;
+  rule.class_ratio = float(settings.class_ratio);
+  rule.cos_normal_change = float(std::cos(normal_limit_deg(map, contact, settings) * std::numbers::pi / 180));
+  if (std::isfinite(settings.color_change)) limit_color(map, contact.voxel, settings.color_change, rule);
+  Region region = Flood(map, rule).run(contact.voxel);
+  if (region.empty())
+    throw TouchError(
+        "region: contact: expected a voxel that agrees with its own surroundings, found class noise there");
+  if (std::isfinite(settings.radius_m) && region.contains(contact.voxel))
+    region = within_geodesic(region, contact.voxel, settings.radius_m / map.voxel_size_m);
+  return region;
+}
+
+Region find_region(const Map& map, const ViewMask& view, const RegionSettings& settings, const Contact* contact) {
+  validate(settings);
+  const auto size_text = [](int w, int h) { return std::to_string(w) + " x " + std::to_string(h); };
+  if (view.mask.width() != view.camera.width || view.mask.height() != view.camera.height)
+    throw TouchError(describe_mismatch("region mask", "size", size_text(view.camera.width, view.camera.height),
+                                       size_text(view.mask.width(), view.mask.height())));
+  const Region surface = surface_blocks(map, band_rule(map, settings));
+  const Eigen::Isometry3d T_camera_world = view.T_world_camera.inverse();
+  const double vs = map.voxel_size_m;
+  const auto in_camera = [&](const BlockCoord& c, int i) -> Eigen::Vector3d {
+    const Index3 f = first_voxel(c), v = voxel_of_offset(i);
+    return T_camera_world * (Eigen::Vector3d(f.x + v.x, f.y + v.y, f.z + v.z) * vs);
+  };
+  const auto for_each_voxel = [&](const auto& visit) {
+    for (size_t b = 0; b < surface.blocks(); ++b)
+      for_each_bit(surface.mask[b], [&](int i) {
+        const Eigen::Vector3d p = in_camera(surface.coord[b], i);
+        if (p.z() > vs) visit(b, i, p, view.camera.project(p));
+      });
+  };
+  // Depth of the nearest surface voxel by pixel; a voxel covers every pixel that its width subtends.
+  DepthImage nearest(view.camera.width, view.camera.height, std::numeric_limits<float>::infinity());
+  for_each_voxel([&](size_t, int, const Eigen::Vector3d& p, const Eigen::Vector2d& uv) {
+    const double ru = 0.5 * view.camera.fx * vs / p.z(), rv = 0.5 * view.camera.fy * vs / p.z();
+    const auto clamp = [](double x, int n) { return int(std::clamp(x, 0.0, double(n))); };
+    const int u1 = clamp(std::floor(uv.x() + ru) + 1, nearest.width()),
+              v1 = clamp(std::floor(uv.y() + rv) + 1, nearest.height());
+    for (int v = clamp(std::ceil(uv.y() - rv), nearest.height()); v < v1; ++v)
+      for (int u = clamp(std::ceil(uv.x() - ru), nearest.width()); u < u1; ++u)
+        nearest(u, v) = std::min(nearest(u, v), float(p.z()));
+  });
+  std::vector<BlockMask> kept(surface.blocks());
+  for_each_voxel([&](size_t b, int i, const Eigen::Vector3d& p, const Eigen::Vector2d& uv) {
+    const double u = std::floor(uv.x() + 0.5), v = std::floor(uv.y() + 0.5);
+    if (u < 0 || v < 0 || u >= nearest.width() || v >= nearest.height()) return;
+    if (view.mask(int(u), int(v)) != 0 && p.z() <= double(nearest(int(u), int(v))) + 2 * vs) kept[b].set(i);
+  });
+  Region region;
+  for (size_t b = 0; b < surface.blocks(); ++b)
+    if (kept[b].any()) region.append(surface.coord[b], kept[b]);
+  if (region.empty()) throw TouchError("region mask: expected pixels that see the map, found none");
+  if (contact != nullptr && !region.contains(contact->voxel))
+    throw TouchError("region mask: expected the contact inside the mask, found it outside");
+  return region;
+}
+
+}  // namespace felt
