@@ -15,15 +15,13 @@ namespace fs = std::filesystem;
 FolderInProgress::FolderInProgress(fs::path destination) : destination_(std::move(destination)) {
   if (destination_.filename().empty()) destination_ = destination_.parent_path();  // "name/" is "name"
   const fs::path parent = destination_.has_parent_path() ? destination_.parent_path() : ".";
-  std::error_code fault;
-  fs::create_directories(parent, fault);
-  if (fault) throw IoError(parent.string() + ": cannot be made: " + fault.message());
   std::string pattern =
       (parent / fs::path(".").concat(destination_.filename().string()).concat(".partial-XXXXXX")).string();
   if (mkdtemp(pattern.data()) == nullptr)
     throw IoError(parent.string() + ": a folder cannot be made in it: " + std::strerror(errno));
   path_ = pattern;
-  fs::permissions(path_, fs::perms(0755), fault);
+  std::error_code ignored;
+  fs::permissions(path_, fs::perms(0755), ignored);
 }
 
 FolderInProgress::~FolderInProgress() {

@@ -8,7 +8,7 @@ namespace felt {
 /// destination under a name that nobody else has.
 class FolderInProgress {
 public:
-  /// Throws IoError where no folder can be made beside `destination`.
+  /// Throws IoError where no folder can be made beside `destination`, such as where that place does not exist.
   explicit FolderInProgress(std::filesystem::path destination);
   ~FolderInProgress();
   FolderInProgress(const FolderInProgress&) = delete;

@@ -217,6 +217,10 @@ ConvertResult convert_sequence(const SequenceReader& reader, const fs::path& out
   std::error_code fault;
   if (fs::exists(out, fault) && !(fs::is_directory(out) && fs::is_empty(out)))
     throw IoError(describe_mismatch(out.string(), "output", "a folder that does not exist yet", "something there"));
+  if (const fs::path parent = (out / "").parent_path().parent_path(); !parent.empty()) {
+    fs::create_directories(parent, fault);
+    if (fault) throw IoError(parent.string() + ": cannot be made: " + fault.message());
+  }
   FolderInProgress folder(out);
   ConvertResult result;
   Writer writer(names, folder.path(), reader.info(), options);

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "io/files/atomic_file.h"
 #include "io/files/folder_in_progress.h"
+#include "io/files/yaml_text.h"
 #include "io/images/depth_encode.h"
 #include "io/images/image_encode.h"
 #include "io/images/label_images.h"
@@ -45,7 +46,7 @@ bool replaceable(const fs::path& folder) {
 std::string sequence_yaml(const SimulationSettings& s, const std::string& root, const std::string& labels,
                           const std::string& classes) {
   const PinholeCamera& c = s.camera;
-  std::string text = "name: " + nlohmann::json(s.scene.name).dump() + "\n";  // a quoted name of YAML, too
+  std::string text = "name: " + yaml_scalar(s.scene.name) + "\n";
   text += formatted("camera: {fx: %.15g, fy: %.15g, cx: %.15g, cy: %.15g, width: %d, height: %d}\n", c.fx, c.fy, c.cx,
                     c.cy, c.width, c.height);
   text += formatted("depth_scale: %.15g\npose_convention: camera-to-world\n", s.depth_scale);

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "core/error.h"
 #include "io/files/text_input.h"
+#include "io/files/yaml_text.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -31,17 +31,6 @@ bool means_no_class(const std::string& name) {
 std::optional<uint16_t> id_of(std::string_view word) {
   const auto number = parse_integer(word);
   return number && *number >= 0 && *number <= 0xffff ? std::optional<uint16_t>(uint16_t(*number)) : std::nullopt;
-}
-
-/// A name as YAML reads it back: plain where it is made of letters, digits, blanks, '_' and '-'.
-std::string quoted_name(const std::string& name) {
-  const auto plain = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-' || c == ' '; };
-  const bool letters =
-      std::all_of(name.begin(), name.end(), plain) && std::isalpha(uint8_t(name.front())) && name.back() != ' ';
-  if (letters) return name;
-  std::string text = "'";
-  for (const char c : name) text += c == '\'' ? "''" : std::string(1, c);
-  return text + "'";
 }
 
 std::optional<Rgba8> color_of(const std::vector<std::string>& words) {
@@ -172,7 +161,7 @@ std::string class_table_yaml(const ClassTable& classes) {
   std::ostringstream text;
   text << "classes:\n";
   for (const ClassInfo& c : classes.classes()) {
-    text << "  - {id: " << c.id << ", name: " << quoted_name(c.name) << ", color: [" << int(c.color.r) << ", "
+    text << "  - {id: " << c.id << ", name: " << yaml_scalar(c.name) << ", color: [" << int(c.color.r) << ", "
          << int(c.color.g) << ", " << int(c.color.b) << "]" << (c.ignore ? ", ignore: true" : "");
     if (c.prior) text << ", prior: " << nlohmann::json(*c.prior).dump();  // every digit: tables are compared
     text << "}\n";

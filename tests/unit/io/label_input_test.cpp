@@ -139,12 +139,16 @@ TEST_CASE("names of a CSV table may hold separators and quotes, between quotes")
 
 TEST_CASE("tables that are written read back the same, whatever their names hold") {
   const TemporaryDirectory folder;
-  const ClassTable table(
-      {{0, "none", {}, true}, {1, "door;double door", {}, false, 1.0 / 3}, {2, "a \"b\", c", {}, false}});
+  const ClassTable table({{0, "none", {}, true},
+                          {1, "door;double door", {}, false, 1.0 / 3},
+                          {2, "a \"b\", c", {}, false},
+                          {3, "it's: #1", {}, false},
+                          {4, "two\nlines", {}, false}});
   write_text(folder.path() / "classes.yaml", class_table_yaml(table));
   CHECK(read_class_table(folder.path() / "classes.yaml") == table);
   const std::vector<double> counts = {1, 2, 3, 4};
-  CHECK(parse_confusion_counts(confusion_counts_csv(counts, table), table, "counts.csv") == counts);
+  const ClassTable two({{1, "door;double door", {}, false}, {2, "a \"b\", c", {}, false}});
+  CHECK(parse_confusion_counts(confusion_counts_csv(counts, two), two, "counts.csv") == counts);
 }
 
 TEST_CASE("the table that lies with the labels is theirs") {
