@@ -45,7 +45,7 @@ struct Evaluated {
 
 std::unique_ptr<SequenceReader> open_reference(const EvaluateCommand& command, const std::string& path) {
   SequenceOptions options;
-  options.read_color = false;
+  options.read_color = options.read_instances = false;
   options.format = command.format;
   options.labels_dir = command.labels;
   options.classes_file = command.classes;
@@ -63,7 +63,7 @@ void read_cameras(EvaluateCommand& command) {
     return;
   }
   SequenceOptions options;
-  options.read_color = false;
+  options.read_color = options.read_instances = false;
   if (command.intrinsics->count() > 0) options.intrinsics = parse_intrinsics(command.camera.intrinsics, "--intrinsics");
   const auto sequence = open_sequence(command.trajectory, options);
   cameras.camera = sequence->info().camera;

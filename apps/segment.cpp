@@ -137,6 +137,7 @@ int run_segment(const SegmentOptions& options) {
   reading.labels_dir = options.labels;
   reading.probs_dir = options.probs;
   reading.instances_dir = options.perception.instances;
+  reading.read_instances = options.perception.vote == SegmentSource::instances;
   if (!options.frames.empty()) reading.frames = parse_frame_selection(options.frames, "--frames");
   auto sequence = open_sequence(options.sequence, reading);
   Perception perception = perception_of(options.perception, sequence->info().classes);
