@@ -149,7 +149,8 @@ NetDescription read_net_description(const fs::path& path) {
     const std::string file = reader.text(root, "file", "");
     if (file.empty()) reader.problem(root, "file", "an ONNX model", "nothing");
     net.file = path.parent_path() / file;
-    if (!file.empty() && !fs::is_regular_file(net.file))
+    std::error_code fault;  // such as a name that is too long
+    if (!file.empty() && !fs::is_regular_file(net.file, fault))
       reader.problem(root["file"], "file", "an ONNX model that exists", "'" + net.file.string() + "'");
     net.backend = NetBackend(reader.choice(root, "backend", {"automatic", "opencv", "onnxruntime"}, 0));
     const YAML::Node input = reader.table(root, "input", {"name", "size", "order", "scale", "mean", "std"});

@@ -73,7 +73,7 @@ ReadValue parsed_into(std::optional<T>& target, T (*parse)(const std::string&, c
 ReadValue path_into(fs::path& target, const fs::path& folder) {
   return [&target, folder](const YAML::Node& value, const std::string& where) {
     target = folder / text_of(value, where, "a path");
-    if (!fs::exists(target))
+    if (std::error_code fault; !fs::exists(target, fault))
       throw ConfigError(describe_mismatch(where, "path", "an existing file or folder", "'" + target.string() + "'"));
   };
 }
