@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "io/files/json_text.h"
 #include "io/map_file/map_file.h"
 
 namespace felt::apps {
@@ -15,12 +16,6 @@ using nlohmann::json;
 // Keys of Map::metadata.
 constexpr const char* kConfig = "config";
 constexpr const char* kProgress = "progress";
-
-/// Paths may hold bytes that text may not: they are replaced.
-template <typename Json>
-std::string as_text(const Json& value) {
-  return value.dump(-1, ' ', false, json::error_handler_t::replace);
-}
 
 /// Twelve numbers a pose, row by row: JSON keeps every bit of them.
 json poses_json(const std::vector<Eigen::Isometry3d>& poses) {
@@ -99,7 +94,7 @@ void require_same_run(const json& then, const json& now, const std::string& wher
   std::vector<std::string> problems;
   for (const std::string& key : keys)
     if (const json was = then.value(key, json()), is = now.value(key, json()); was != is)
-      problems.push_back(describe_mismatch("--resume", key, as_text(was) + " as in " + where, as_text(is)));
+      problems.push_back(describe_mismatch("--resume", key, json_text(was) + " as in " + where, json_text(is)));
   if (!problems.empty()) throw ConfigError(problems);
 }
 
@@ -109,14 +104,14 @@ std::string fusion_settings(const nlohmann::ordered_json& config) {
   nlohmann::ordered_json shaping = config;
   for (const char* key : {"sequence", "frames", "labels", "probs", "classes", "properties", "touches"})
     shaping.erase(key);
-  return as_text(shaping);
+  return json_text(shaping);
 }
 
 void save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
                      bool complete, const std::string& touches, const std::string& recording,
                      const nlohmann::ordered_json& config, const std::filesystem::path& path) {
-  map.metadata[kConfig] = as_text(config);
-  map.metadata[kProgress] = as_text(progress_of(record, viewpoints, complete, touches, recording));
+  map.metadata[kConfig] = json_text(config);
+  map.metadata[kProgress] = json_text(progress_of(record, viewpoints, complete, touches, recording));
   // On the way nobody looks at views, and they take longer than the rest.
   save_map(map, path, {.views = complete || !record.stopped.empty()});
 }
@@ -129,7 +124,7 @@ std::optional<Checkpoint> resume(const std::filesystem::path& path, const std::s
   const json progress = text_of(map, kProgress, where);
   if (progress.value("recording", json()) != recording)
     throw ConfigError(describe_mismatch("--resume", "recording", "the one that " + where + " was made of", "another"));
-  require_same_run(text_of(map, kConfig, where), json::parse(as_text(config)), where);
+  require_same_run(text_of(map, kConfig, where), json::parse(json_text(config)), where);
   Checkpoint checkpoint{std::move(map), {}, {}, false, {}};
   read_progress(progress, where, checkpoint);
   return checkpoint;

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "apps/exit_code.h"
+#include "io/files/json_text.h"
 
 namespace felt::apps {
 namespace {
@@ -57,10 +58,6 @@ CLI::App& add_command(CLI::App& app, const CommandText& text, CommonOptions& com
   return command;
 }
 
-std::string json_text(const nlohmann::ordered_json& document) {
-  return document.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
-void print_json(const nlohmann::ordered_json& document) { std::printf("%s\n", json_text(document).c_str()); }
+void print_json(const nlohmann::ordered_json& document) { std::printf("%s\n", json_text(document, 2).c_str()); }
 
 }  // namespace felt::apps

@@ -30,9 +30,7 @@ struct CommandText {
 /// exceptions (core/error.h).
 CLI::App& add_command(CLI::App& app, const CommandText& text, CommonOptions& common, std::function<int()> run);
 
-/// A document as indented text. Bytes of paths that are no UTF-8, which JSON cannot hold, are replaced.
-std::string json_text(const nlohmann::ordered_json& document);
-/// The same on stdout.
+/// A document on stdout, indented.
 void print_json(const nlohmann::ordered_json& document);
 
 }  // namespace felt::apps

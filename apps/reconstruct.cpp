@@ -24,6 +24,7 @@
 #include "core/simd.h"
 #include "io/doctor/doctor.h"
 #include "io/files/atomic_file.h"
+#include "io/files/json_text.h"
 #include "io/files/system_memory.h"
 #include "io/meshes/mesh_io.h"
 #include "io/sequence/decode_ahead.h"
@@ -276,7 +277,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   if (!touches.file.empty())
     document["touches"] =
         touches_done.empty() ? touches_json(touches, touched) : nlohmann::ordered_json::parse(touches_done);
-  const std::string json = json_text(document) + "\n";
+  const std::string json = json_text(document, 2) + "\n";
   write_file_atomically(options.out / kReportName, json);
 
   if (report.mesh_triangles == 0)

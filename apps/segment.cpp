@@ -13,6 +13,7 @@
 #include "apps/progress.h"
 #include "core/error.h"
 #include "io/files/atomic_file.h"
+#include "io/files/json_text.h"
 #include "io/files/text_input.h"
 #include "io/images/label_images.h"
 #include "io/sequence/decode_ahead.h"
@@ -74,7 +75,7 @@ json state_of(const SegmentOptions& options, const ClassTable& classes) {
 void prepare(const SegmentOptions& options, const OutputNames& names, const ClassTable& classes) {
   prepare_output_folder(options.out, {}, false);
   const fs::path file = options.out / kStateName;
-  const std::string state = json_text(state_of(options, classes)) + "\n";
+  const std::string state = json_text(state_of(options, classes), 2) + "\n";
   if (fs::exists(file) && !options.overwrite) {
     if (read_whole_file(file) == state) return;
     throw ConfigError(describe_mismatch(options.out.string(), "output exists",

@@ -4,6 +4,8 @@
 #include <cctype>
 #include <nlohmann/json.hpp>
 
+#include "io/files/json_text.h"
+
 namespace felt {
 
 std::string yaml_scalar(const std::string& text) {
@@ -13,7 +15,7 @@ std::string yaml_scalar(const std::string& text) {
     return text;
   // Line ends and the like: a string of JSON is one of YAML.
   if (std::any_of(text.begin(), text.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }))
-    return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+    return json_text(nlohmann::json(text));
   std::string quoted = "'";
   for (const char c : text) quoted += c == '\'' ? "''" : std::string(1, c);
   return quoted + "'";

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "io/files/json_text.h"
+
 namespace felt {
 
 std::string to_json(const MapDifference& difference, const std::string& a, const std::string& b, double tolerance) {
@@ -35,7 +37,7 @@ std::string to_json(const MapDifference& difference, const std::string& a, const
         {"both", difference.touches_both},
         {"regions_changed", difference.regions_changed},
         {"region_voxels_changed", difference.region_voxels_changed}}}};
-  return report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+  return json_text(report, 2);
 }
 
 std::string to_text(const MapDifference& difference) {

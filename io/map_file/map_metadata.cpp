@@ -161,7 +161,7 @@ openvdb::MetaMap to_metadata(const Map& map, const std::string& hash) {
   return metadata;
 }
 
-MapHeader read_metadata(const openvdb::MetaMap& metadata, const std::string& where) {
+MapHeader read_metadata(const openvdb::MetaMap& metadata, const std::string& where) try {
   MapHeader header;
   if (const auto version = value<int32_t>(metadata, kFormat, where); version != int32_t(kMapFileVersion))
     throw FormatError(
@@ -171,12 +171,8 @@ MapHeader read_metadata(const openvdb::MetaMap& metadata, const std::string& whe
   header.hash = value<std::string>(metadata, kHash, where);
   header.classes = parsed(metadata, kClasses, where, classes_from_json);
   header.frames = parsed(metadata, kFrames, where, journal_from_json);
-  if (metadata[kProperties] != nullptr) try {
-      header.properties =
-          parse_properties(value<std::string>(metadata, kProperties, where), where + ": property_table");
-    } catch (const ConfigError& fault) {  // of a table's file; this is a damaged map
-      throw FormatError(fault.what());
-    }
+  if (metadata[kProperties] != nullptr)
+    header.properties = parse_properties(value<std::string>(metadata, kProperties, where), where + ": property_table");
   if (metadata[kTouches] != nullptr)
     header.touches = parse_touch_journal(value<std::string>(metadata, kTouches, where), where);
   for (auto entry = metadata.beginMeta(); entry != metadata.endMeta(); ++entry)
@@ -184,6 +180,9 @@ MapHeader read_metadata(const openvdb::MetaMap& metadata, const std::string& whe
       header.metadata[entry->first.substr(kTextPrefix.size())] =
           value<std::string>(metadata, entry->first.c_str(), where);
   return header;
+} catch (const ConfigError& fault) {
+  // What the parser of a file of settings refuses is, within a map, damage.
+  throw FormatError(fault.what());
 }
 
 }  // namespace felt

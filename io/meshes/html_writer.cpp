@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "io/files/atomic_file.h"
+#include "io/files/json_text.h"
 #include "io/meshes/mesh_io.h"
 
 namespace felt {
@@ -203,7 +204,7 @@ std::string data_element(const char* id, const std::vector<T>& values) {
 
 /// JSON that cannot end the element it stands in.
 std::string embedded(const nlohmann::json& json) {
-  std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  std::string text = json_text(json);
   for (size_t at = 0; (at = text.find('<', at)) != std::string::npos;) text.replace(at, 1, "\\u003c");
   return text;
 }

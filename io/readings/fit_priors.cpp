@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "io/files/json_text.h"
 #include "io/files/text_input.h"
 
 namespace felt {
@@ -120,7 +121,7 @@ std::string fit_priors_json(const std::vector<ClassReadings>& classes, double ma
   }
   out["confusion"] = table;
   out["inseparable"] = inseparable;
-  return out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+  return json_text(out, 2);
 }
 
 }  // namespace felt

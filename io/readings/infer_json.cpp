@@ -11,6 +11,7 @@
 #include "inference/material.h"
 #include "inference/mixture.h"
 #include "inference/priors.h"
+#include "io/files/json_text.h"
 #include "io/readings/infer_request.h"
 #include "io/readings/infer_single.h"
 
@@ -138,7 +139,7 @@ InferAnswer infer_json_line(std::string_view line, size_t number_of_line, InferP
     return {answer(parse_infer_request(line), precision).dump(), false};
   } catch (const Error& e) {
     const ordered_json error{{"error", e.what()}, {"line", number_of_line}};
-    return {error.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace), true};
+    return {json_text(error), true};
   }
 }
 

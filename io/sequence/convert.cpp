@@ -110,11 +110,8 @@ public:
                 matrix_text(frame.T_world_camera, "\n") + "\n";
     } else if (names_.layout == std::string("replica")) {
       poses_ += matrix_text(frame.T_world_camera, " ") + "\n";
-    } else {
-      const std::string pose = " " + matrix_text(frame.T_world_camera, " ") + "\n";
-      poses_ += std::to_string(i) + pose;
-      stamped_poses_ += number(frame.stamp_s) + pose;
-      has_stamps_ |= frame.stamp_s != std::floor(frame.stamp_s);
+    } else if (names_.layout == std::string("generic")) {
+      numbered_.push_back({i, frame.stamp_s, matrix_text(frame.T_world_camera, " ")});
     }
     ++result.written;
   }
@@ -129,7 +126,7 @@ public:
       put("sequence.yaml", "camera: {fx: " + fx + ", fy: " + fy + ", cx: " + cx + ", cy: " + cy + ", width: " + width +
                                ", height: " + height + "}\ndepth_scale: " + scale +
                                "\npose_convention: camera-to-world\n");
-      put("poses.txt", has_stamps_ ? stamped_poses_ : poses_);
+      put("poses.txt", numbered_text());
     } else if (layout == "tum") {
       put("depth.txt", "# timestamp filename\n" + depth_list_);
       put("rgb.txt", "# timestamp filename\n" + color_list_);
@@ -176,6 +173,16 @@ private:
     write_bytes(path, {bytes.begin(), bytes.end()});
   }
 
+  /// A pose a line, by the moment if there are moments: whole numbers would be taken for frame numbers.
+  std::string numbered_text() const {
+    const bool moments = std::any_of(numbered_.begin(), numbered_.end(),
+                                     [](const NumberedPose& p) { return p.stamp_s != std::floor(p.stamp_s); });
+    std::string text;
+    for (const NumberedPose& p : numbered_)
+      text += (moments ? number(p.stamp_s) : std::to_string(p.number)) + " " + p.matrix + "\n";
+    return text;
+  }
+
   static std::string number_with_microseconds(double value) {
     char text[48];
     std::snprintf(text, sizeof text, "%.6f", value);
@@ -187,8 +194,13 @@ private:
   const SequenceInfo& info_;
   bool from_zero_, jpeg_;
   double depth_scale_ = 0;
-  std::string poses_, stamped_poses_, depth_list_, color_list_;
-  bool has_stamps_ = false;  ///< times, which whole numbers in place of frame numbers would not be taken for
+  std::string poses_, depth_list_, color_list_;
+  struct NumberedPose {
+    int64_t number;
+    double stamp_s;
+    std::string matrix;
+  };
+  std::vector<NumberedPose> numbered_;
 };
 
 const FileNames& names_of(const std::string& layout) {

@@ -107,9 +107,8 @@ Eigen::Isometry3d T_scan_face(int face) {
   return T;
 }
 
-DepthImage depth_of_scan(const std::vector<Eigen::Vector3f>& points, int face) {
+DepthImage depth_of_scan(const std::vector<Eigen::Vector3f>& points, int face, const PinholeCamera& camera) {
   const SphericalImage image = spherical_image(points);
-  const PinholeCamera camera = scan_face_camera();
   const Eigen::Matrix3d R = T_scan_face(face).linear();
   DepthImage depth(camera.width, camera.height);
   for (int v = 0; v < camera.height; ++v)

@@ -26,9 +26,11 @@ PinholeCamera scan_face_camera();
 /// Pose of a face's camera (OpenCV axes) in the sensor's frame; faces look forward, left, backward and right.
 Eigen::Isometry3d T_scan_face(int face);
 
-/// Depth image of a face. Points are put into a spherical image of 64 rows, the nearest one of a cell counting; a pixel
-/// of the face takes the range between the rows above and below its ray (linear in inverse range, exact for planes seen
-/// across one column) where both lie within two rows and differ by less than a fifth: gaps between surfaces stay open.
-DepthImage depth_of_scan(const std::vector<Eigen::Vector3f>& points, int face);
+/// Depth image of a face, seen by a camera of 90 degrees. Points are put into a spherical image of 64 rows, the nearest
+/// one of a cell counting; a pixel of the face takes the range between the rows above and below its ray (linear in
+/// inverse range, exact for planes seen across one column) where both lie within two rows and differ by less than a
+/// fifth: gaps between surfaces stay open.
+DepthImage depth_of_scan(const std::vector<Eigen::Vector3f>& points, int face,
+                         const PinholeCamera& camera = scan_face_camera());
 
 }  // namespace felt

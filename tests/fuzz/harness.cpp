@@ -23,6 +23,7 @@
 #include "io/readings/touches.h"
 #include "io/segmentation/network.h"
 #include "io/sequence/camera_file.h"
+#include "io/sequence/lidar_scan.h"
 #include "io/sequence/open_sequence.h"
 #include "io/sequence/pose_list.h"
 #include "io/sequence/trajectory_file.h"
@@ -136,16 +137,18 @@ void read_properties_yaml(const std::string& bytes) {
 }
 
 /// Opens the sequence and reads its first frames.
-void read_frames_of(const fs::path& path, const std::string& format, int64_t most = 3) {
+void read_frames_of(const fs::path& path, const std::string& format) {
   SequenceOptions options;
   options.format = format;
   const auto sequence = open_sequence(path, options);
-  for (int64_t i = 0; i < std::min(most, sequence->size()); ++i) sequence->read(i);
+  for (int64_t i = 0; i < std::min<int64_t>(3, sequence->size()); ++i) sequence->read(i);
 }
 
 void read_sens(const std::string& bytes) { read_frames_of(as_file("scan.sens", bytes), "sens"); }
 
+/// A picture of 8 x 6 pixels, written once.
 void write_view(const fs::path& file) {
+  if (fs::exists(file)) return;
   fs::create_directories(file.parent_path());
   write_bytes(file, encode_png(Image<uint16_t>(8, 6, 1500)));
 }
@@ -163,8 +166,11 @@ void read_redwood_log(const std::string& bytes) {
   read_frames_of(scratch_folder() / "redwood", "redwood");
 }
 
-/// One of the views that are made of a scan, for they take their time.
-void read_scan(const std::string& bytes) { read_frames_of(as_file("scan.bin", bytes), "lidar", 1); }
+/// Points, and the views that are made of them: coarse ones, for those of 512 x 512 pixels take a quarter of a second.
+void read_scan(const std::string& bytes) {
+  const std::vector<Eigen::Vector3f> points = decode_scan(as_image(bytes), "scan.bin");
+  for (int face = 0; face < kScanFaces; ++face) depth_of_scan(points, face, {16, 16, 15.5, 15.5, 32, 32});
+}
 
 /// One scan that has a pose.
 void read_kitti_calibration(const std::string& bytes) {
@@ -212,10 +218,8 @@ void read_tum_lists(const std::string& bytes) {
 /// One view of 8 x 6 pixels below the description.
 void read_sequence_yaml(const std::string& bytes) {
   const fs::path folder = scratch_folder() / "sequence";
-  if (fs::create_directories(folder / "depth")) {
-    write_bytes(folder / "depth" / "0.png", encode_png(Image<uint16_t>(8, 6, 1500)));
-    as_file("sequence/poses.txt", "0 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n");
-  }
+  write_view(folder / "depth" / "0.png");
+  as_file("sequence/poses.txt", "0 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n");
   as_file("sequence/sequence.yaml", bytes);
   read_frames_of(folder, "generic");
 }
