@@ -99,7 +99,8 @@ TEST_CASE("headers do not pull in OpenVDB's tools, OpenCV, JSON, YAML or the com
   for (const std::string& module : kModules) {
     CHECK(files_including(module, "^openvdb/tools/", true) == kNone);
     CHECK(files_including(module, "^(opencv2|yaml-cpp)/", true) == kNone);
-    if (module != "apps") CHECK(files_including(module, "^(nlohmann|CLI)/", true) == kNone);
+    // Its forward declarations are a page.
+    if (module != "apps") CHECK(files_including(module, R"(^(nlohmann/(?!json_fwd\.hpp)|CLI/))", true) == kNone);
   }
 }
 
