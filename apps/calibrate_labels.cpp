@@ -6,6 +6,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "core/error.h"
 #include "io/files/atomic_file.h"
@@ -111,8 +112,7 @@ Json largest_confusions(const ConfusionCounts& counts, const ClassTable& classes
 }
 
 int run(const CalibrateOptions& o) {
-  if (fs::exists(o.out) && !o.overwrite)
-    throw IoError(describe_mismatch(o.out.string(), "output exists", "no file there, or --force to replace it", "one"));
+  require_no_file(o.out, o.overwrite);
   SequenceOptions reading;
   reading.format = o.format;
   reading.labels_dir = o.labels, reading.probs_dir = o.probs, reading.classes_file = o.classes;

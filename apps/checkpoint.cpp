@@ -107,13 +107,13 @@ std::string fusion_settings(const nlohmann::ordered_json& config) {
   return json_text(shaping);
 }
 
-void save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
-                     bool complete, const std::string& touches, const std::string& recording,
-                     const nlohmann::ordered_json& config, const std::filesystem::path& path) {
+std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
+                            bool complete, const std::string& touches, const std::string& recording,
+                            const nlohmann::ordered_json& config, const std::filesystem::path& path) {
   map.metadata[kConfig] = json_text(config);
   map.metadata[kProgress] = json_text(progress_of(record, viewpoints, complete, touches, recording));
   // On the way nobody looks at views, and they take longer than the rest.
-  save_map(map, path, {.views = complete || !record.stopped.empty()});
+  return save_map(map, path, {.views = complete || !record.stopped.empty()});
 }
 
 std::optional<Checkpoint> resume(const std::filesystem::path& path, const std::string& recording,

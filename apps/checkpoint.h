@@ -23,9 +23,10 @@ std::string fusion_settings(const nlohmann::ordered_json& config);
 /// Writes the map with all that `resume` needs, and its views where the run ends. `recording`:
 /// SequenceInfo::fingerprint. `config`: settings as used. `viewpoints`: ViewNovelty::seen. `complete`: nothing is left
 /// to do for this map but to mesh it; its recorded touches are in it, and `touches` (JSON) says what became of each.
-void save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
-                     bool complete, const std::string& touches, const std::string& recording,
-                     const nlohmann::ordered_json& config, const std::filesystem::path& path);
+/// Returns the map's hash.
+std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
+                            bool complete, const std::string& touches, const std::string& recording,
+                            const nlohmann::ordered_json& config, const std::filesystem::path& path);
 
 /// Where an earlier run ended.
 struct Checkpoint {

@@ -8,6 +8,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/output_folder.h"
 #include "apps/touch_options.h"
 #include "core/error.h"
 #include "io/map_file/map_file.h"
@@ -47,9 +48,7 @@ void check(const ExportOptions& o) {
                                          nlohmann::json(o.box_m).dump()));
   if (!problems.empty()) throw ConfigError(problems);
   for (const fs::path& file : {o.vdb, o.mesh, o.points, o.html})
-    if (!file.empty() && fs::exists(file) && !o.overwrite)
-      throw IoError(
-          describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", "one"));
+    if (!file.empty()) require_no_file(file, o.overwrite);
 }
 
 int slot_of_class(const Map& map, const ExportOptions& o) {

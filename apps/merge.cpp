@@ -8,6 +8,7 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
+#include "apps/output_folder.h"
 #include "io/map_file/map_file.h"
 #include "mapping/maps/merge.h"
 
@@ -19,6 +20,7 @@ struct Options {
   std::vector<std::string> maps;
   std::string out;
   MergeOptions merge;
+  bool overwrite = false;
 };
 
 int run(const Options& options) {
@@ -32,9 +34,10 @@ int run(const Options& options) {
   std::vector<const Map*> pointers;
   for (const std::string& path : options.maps) pointers.push_back(&maps.emplace_back(load_map(path)));
   const auto loaded = Clock::now();
+  require_nothing_lost(options.out, pointers, options.overwrite);
   const Map result = merge(pointers, options.merge);
   const auto merged = Clock::now();
-  save_map(result, options.out);
+  const std::string hash = save_map(result, options.out);
   const auto saved = Clock::now();
   const nlohmann::json report = {
       {"out", options.out},
@@ -42,14 +45,14 @@ int run(const Options& options) {
       {"frames", frame_count(result.frames)},
       {"blocks", result.store.size()},
       {"active_voxels", active_voxel_count(result)},
-      {"map_hash", map_hash(result)},
+      {"map_hash", hash},
       {"time_s",
        {{"load", seconds(start, loaded)}, {"merge", seconds(loaded, merged)}, {"save", seconds(merged, saved)}}}};
   if (options.common.json)
     print_json(report);
   else if (!options.common.quiet)
     std::printf("%s: %zu maps merged: %zu frames, %zu blocks, hash %s\n", options.out.c_str(), maps.size(),
-                frame_count(result.frames), result.store.size(), report.at("map_hash").get<std::string>().c_str());
+                frame_count(result.frames), result.store.size(), hash.c_str());
   return kDone;
 }
 
@@ -64,6 +67,8 @@ void add_merge(CLI::App& app) {
       options->common, [options] { return run(*options); });
   command.add_option("MAPS", options->maps, "Map files")->required()->expected(1, -1);
   command.add_option("--out", options->out, "Map file to write")->required();
+  command.add_flag("--force", options->overwrite,
+                   "Replace a map although it holds frames or touches that these do not");
   command.add_flag("--allow-shared-frames", options->merge.allow_shared_frames,
                    "Merge although the journals share frames, which then count twice");
   command.add_option("--max-weight", options->merge.max_weight, "Cap of the summed weight, as in reconstruct")

@@ -2,14 +2,37 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <set>
 
 #include "core/error.h"
 #include "io/files/atomic_file.h"
+#include "io/map_file/map_file.h"
 
 namespace felt::apps {
 namespace fs = std::filesystem;
+namespace {
+
+/// What of the journals no source holds, in words; empty where there is nothing.
+std::string missing_from(std::span<const Map* const> sources, const MapJournals& journals) {
+  FrameJournal frames;
+  std::set<uint64_t> touches;
+  for (const Map* source : sources) {
+    frames = joined(frames, source->frames);
+    for (const Touch& touch : source->touches.touches) touches.insert(touch.id);
+  }
+  const size_t lost_frames =
+      shared_frames(journals.frames, journals.frames).size() - shared_frames(journals.frames, frames).size();
+  const auto lost_touches = std::count_if(journals.touches.touches.begin(), journals.touches.touches.end(),
+                                          [&](const Touch& touch) { return !touches.contains(touch.id); });
+  if (lost_frames == 0 && lost_touches == 0) return "";
+  return "a map with " + std::to_string(lost_frames) + " frames and " + std::to_string(lost_touches) +
+         " touches that the new one would not hold";
+}
+
+}  // namespace
 
 void prepare_output_folder(const fs::path& folder, const std::vector<std::string>& names, bool overwrite) {
   std::error_code error;
@@ -27,6 +50,23 @@ void prepare_output_folder(const fs::path& folder, const std::vector<std::string
   if (!in_the_way.empty() && !overwrite)
     throw IoError(
         describe_mismatch(folder.string(), "output exists", "no result there, or --force to replace it", in_the_way));
+}
+
+void require_no_file(const fs::path& file, bool overwrite) {
+  if (!overwrite && fs::exists(file))
+    throw IoError(describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", "one"));
+}
+
+void require_nothing_lost(const fs::path& file, std::span<const Map* const> sources, bool overwrite) {
+  if (overwrite || !fs::is_regular_file(file)) return;
+  std::string lost;
+  try {
+    lost = missing_from(sources, load_journals(file));
+  } catch (const Error&) {
+    lost = "a file that is no map that can be read";
+  }
+  if (!lost.empty())
+    throw IoError(describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", lost));
 }
 
 }  // namespace felt::apps

@@ -136,11 +136,11 @@ std::string nothing_fused(const FusionRecord& record) {
 }
 
 /// Map file and mesh, side by side. The map is what cannot be made again: a mesh that fails does not stop its saving.
-void write_results(const Map& map, const std::function<void()>& save, const fs::path& folder, int threads,
+void write_results(const Map& map, const std::function<std::string()>& save, const fs::path& folder, int threads,
                    ReconstructReport& report) {
   auto saving = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&] {
     const auto start = Clock::now();
-    save();
+    report.map_hash = save();
     report.save_s = seconds_since(start);
   });
   std::exception_ptr mesh_failure;
@@ -153,7 +153,6 @@ void write_results(const Map& map, const std::function<void()>& save, const fs::
     report.mesh_vertices = mesh.positions.size();
     report.mesh_triangles = mesh.triangles.size();
     report.mesh_s = seconds_since(start);
-    report.map_hash = map_hash(map);
   } catch (...) {
     mesh_failure = std::current_exception();
   }
@@ -242,8 +241,8 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
       touches_done = std::move(earlier->touches);
     }
   const auto save = [&] {
-    save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, touches_done, source.recording, config,
-                    options.out / kMapName);
+    return save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, touches_done, source.recording,
+                           config, options.out / kMapName);
   };
   fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save, map, scratch,
        report.fusion);
@@ -258,7 +257,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
     touched = apply_touches(map, touches);
     report.touch_s = seconds_since(start_touch);
     complete = true;
-    if (!touches.file.empty()) touches_done = touches_json(touches, touched).dump();
+    if (!touches.file.empty()) touches_done = json_text(touches_json(touches, touched));
   }
   write_results(map, save, options.out, common.thread_count(), report);
   report.voxel_size_m = options.voxel_size_m, report.truncation_m = options.truncation_m;

@@ -1,7 +1,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +9,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/output_folder.h"
 #include "apps/touch_options.h"
 #include "inference/decision.h"
 #include "io/map_file/map_file.h"
@@ -26,7 +26,7 @@ struct TouchOptions : CommonOptions {
   std::string map, at, property, file, out, undo, redo, properties, model = "material", projection = "kl";
   double value = 0, sigma = 0, stamp_s = 0;
   std::optional<double> rho;
-  bool dry_run = false, list = false;
+  bool dry_run = false, list = false, overwrite = false;
   RegionOptions region;
   // A touch given by a frame of the sequence and a pixel.
   std::string sequence, masks;
@@ -161,21 +161,11 @@ TouchRequest request_of(const TouchOptions& options) {
   return request;
 }
 
-/// Why a touch cannot have been recorded with the frames that the map was made of; nothing where it can, or nobody
-/// knows.
-std::optional<std::string> outside_recording(const Map& map, const RecordedTouch& touch) {
-  int64_t first = std::numeric_limits<int64_t>::max(), last = std::numeric_limits<int64_t>::min();
-  for (const FusedFrames& run : map.frames.runs)
-    for (const int64_t frame : run.frames) first = std::min(first, frame), last = std::max(last, frame);
-  if (!touch.frame || first > last || (*touch.frame >= first && *touch.frame <= last)) return std::nullopt;
-  return describe_mismatch("touch", "frame",
-                           "one of the map's, " + std::to_string(first) + " to " + std::to_string(last),
-                           std::to_string(*touch.frame));
-}
-
 int run_touch(const TouchOptions& options) {
   if (options.list) return list_touches(options);
   const TouchRequest request = request_of(options);
+  std::error_code fault;
+  const bool in_place = options.out.empty() || std::filesystem::equivalent(options.map, options.out, fault);
   Map map = load_map(options.map);
   use_properties(map, options.properties);
   json out;
@@ -198,11 +188,9 @@ int run_touch(const TouchOptions& options) {
          apply_recorded_touches(map, touches, request, opened ? &opened->touched : nullptr)) {
       const std::string where = options.file.empty() ? "frame " + std::to_string(*options.frame)
                                                      : options.file + ":" + std::to_string(outcome.touch.line);
-      const std::string refused =
-          opened ? outcome.refused : outside_recording(map, outcome.touch).value_or(outcome.refused);
-      if (!refused.empty()) {
+      if (!outcome.refused.empty()) {
         code = kInputOutput;
-        std::fprintf(stderr, "feltmap: error: %s: %s\n", where.c_str(), refused.c_str());
+        std::fprintf(stderr, "feltmap: error: %s: %s\n", where.c_str(), outcome.refused.c_str());
       } else {
         out["touches"].push_back(effect_json(map, *outcome.effect, request.region));
         effects.push_back(*outcome.effect);
@@ -219,8 +207,9 @@ int run_touch(const TouchOptions& options) {
     effects.push_back(apply_touch(map, resolve_touch(map, request, view ? &*view : nullptr)));
     out.update(effect_json(map, effects.back(), request.region));
   }
-  out["map_hash"] = map_hash(map);
-  if (!options.dry_run) save_map(map, options.out.empty() ? options.map : options.out);
+  if (const Map* source = &map; !in_place && !options.dry_run)
+    require_nothing_lost(options.out, {&source, 1}, options.overwrite);
+  out["map_hash"] = options.dry_run ? map_hash(map) : save_map(map, in_place ? options.map : options.out);
   // Only what is done is said to be.
   if (options.json) {
     print_json(out);
@@ -276,6 +265,8 @@ void add_touch(CLI::App& app) {
   command.add_option("--rho", options->rho, "Correlation of readings within a region, instead of the property's");
   command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
   command.add_option("--out", options->out, "Write here instead of in place");
+  command.add_flag("--force", options->overwrite,
+                   "Replace the file of --out although it holds frames or touches that this map does not");
   command.add_flag("--dry-run", options->dry_run, "Say what would change and write nothing");
   options->region.add_to(command);
 }

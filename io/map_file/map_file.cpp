@@ -163,14 +163,22 @@ Map read_map(const fs::path& path, uint64_t bytes) {
 
 }  // namespace
 
-void save_map(const Map& map, const fs::path& path, const SaveOptions& options) {
+std::string save_map(const Map& map, const fs::path& path, const SaveOptions& options) {
   MapTrailer trailer;
   VdbWriter file(path, &trailer);
   const std::vector<LeafGrid> grids = options.views ? map_grids(map) : state_grids(map);
-  const std::string hash = map_hash(map);
+  std::string hash = map_hash(map);
   file.begin(to_metadata(map, hash), grids.size(), hash);
   for (const LeafGrid& grid : grids) file.write(grid, codec_of(options.compression, grid.noisy));
   file.commit(trailer.finish(kMapFileVersion));
+  return hash;
+}
+
+MapJournals load_journals(const fs::path& path) {
+  const uint64_t bytes = verify_map_trailer(path, kMapFileVersion);
+  const OpenedFile opened(path);
+  MapHeader header = read_metadata(VdbReader(opened, bytes, path.string()).metadata(), path.string());
+  return {std::move(header.frames), std::move(header.touches)};
 }
 
 Map load_map(const fs::path& path) { return read_map(path, verify_map_trailer(path, kMapFileVersion)); }

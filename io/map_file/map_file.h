@@ -27,12 +27,21 @@ struct SaveOptions {
 
 /// Writes the map so that `path` holds either what it held before or the whole new map, also through a crash or a full
 /// disk. Memory: less than 100 MiB and a thirtieth of the planes, whatever the map. The same map gives the same bytes.
-/// Throws IoError.
-void save_map(const Map& map, const std::filesystem::path& path, const SaveOptions& options = {});
+/// Returns the map's hash (`map_hash`), which the file holds. Throws IoError.
+std::string save_map(const Map& map, const std::filesystem::path& path, const SaveOptions& options = {});
 
 /// Reads a map whose `map_hash` is that of the map that was saved, and which goes on as that one would have. The
 /// checksum is verified before any of the content is interpreted. Throws IoError where the file cannot be read and
 /// FormatError, with the reason, where it is no map file, has an unknown version, or was changed in any byte.
 Map load_map(const std::filesystem::path& path);
+
+/// What a map was made of.
+struct MapJournals {
+  FrameJournal frames;
+  TouchJournal touches;  ///< without their regions
+};
+
+/// The journals of a map file; its grids are only checked against the checksum. Throws as `load_map` does.
+MapJournals load_journals(const std::filesystem::path& path);
 
 }  // namespace felt

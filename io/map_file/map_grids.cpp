@@ -73,11 +73,12 @@ std::vector<std::string> export_vdb(const Map& map, const std::filesystem::path&
   std::vector<LeafGrid> grids = map_grids(map);
   require_known(grids, options.grids);
   std::erase_if(grids, [&](const LeafGrid& grid) { return !chosen(grid.name, options.grids); });
+  const std::string hash = map_hash(map);
   openvdb::MetaMap metadata;
   metadata.insertMeta("creator", openvdb::StringMetadata("feltmap export"));
-  metadata.insertMeta("map_hash", openvdb::StringMetadata(map_hash(map)));
+  metadata.insertMeta("map_hash", openvdb::StringMetadata(hash));
   VdbWriter file(path);
-  file.begin(metadata, grids.size(), map_hash(map));
+  file.begin(metadata, grids.size(), hash);
   std::vector<std::string> names;
   for (const LeafGrid& grid : grids) {
     file.write(options.part != nullptr ? clipped(grid, *options.part) : grid, VdbCodec::zip, options.half);

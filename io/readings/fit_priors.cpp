@@ -1,7 +1,6 @@
 #include "io/readings/fit_priors.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -41,9 +40,8 @@ std::vector<ClassReadings> read_readings_csv(const std::filesystem::path& file) 
       throw FormatError(describe_mismatch(where, "cells", std::to_string(header.size()), std::to_string(cells.size())));
     }
     const std::string &name = cells[class_column], &text = cells[value_column];
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
+    const std::optional<double> value = parse_number(text);
+    if (!value || !std::isfinite(*value)) {
       throw FormatError(describe_mismatch(where, "value", "a finite number", "'" + text + "'"));
     }
     if (name.empty()) throw FormatError(describe_mismatch(where, "class", "a name", "an empty cell"));
@@ -54,7 +52,7 @@ std::vector<ClassReadings> read_readings_csv(const std::filesystem::path& file) 
     const std::string group = group_column < cells.size() ? cells[group_column] : "";
     const auto [of_group, new_group] = group_index.try_emplace({of_class->second, group}, groups.size());
     if (new_group) groups.emplace_back();
-    groups[of_group->second].push_back(value);
+    groups[of_group->second].push_back(*value);
   }
   if (classes.empty()) {
     throw FormatError(describe_mismatch(file.string(), "content", "a header and at least one reading", "none"));

@@ -1,7 +1,6 @@
 #include "io/readings/friction_log.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -113,8 +112,8 @@ ForceLog parse_force_log(const std::string& text, const std::string& where) {
     bool good = true;
     for (size_t i = 0; i < 4 && good; ++i) {
       const std::string cell = columns[i] < cells.size() ? cells[columns[i]] : "";
-      const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), values[i]);
-      good = error == std::errc() && end == cell.data() + cell.size() && std::isfinite(values[i]);
+      values[i] = parse_number(cell).value_or(std::numeric_limits<double>::quiet_NaN());
+      good = std::isfinite(values[i]);
       if (!good) problems.push_back(describe_mismatch(at, "cell", "a finite number", "'" + cell.substr(0, 40) + "'"));
     }
     if (good && !log.time_s.empty() && values[0] <= log.time_s.back()) {

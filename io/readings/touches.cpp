@@ -1,9 +1,9 @@
 #include "io/readings/touches.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -11,14 +11,6 @@
 
 namespace felt {
 namespace {
-
-template <typename T>
-std::optional<T> number(const std::string& text) {
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
 
 /// Column numbers by name, from the header line.
 class Columns {
@@ -50,13 +42,13 @@ RecordedTouch parse_row(const std::vector<std::string>& cells, const Columns& co
   RecordedTouch touch;
   const auto real = [&](const char* name) {
     const std::string& cell = cells[columns[name]];
-    const auto value = number<double>(cell);
+    const auto value = parse_number(cell);
     if (!value) problems.push_back(describe_mismatch(where, name, "a number", "'" + cell + "'"));
     return value.value_or(0.0);
   };
   if (columns.has("stamp")) touch.stamp_s = real("stamp");
   if (columns.has("frame")) {
-    touch.frame = number<int64_t>(cells[columns["frame"]]);
+    touch.frame = parse_integer(cells[columns["frame"]]);
     if (!touch.frame)
       problems.push_back(describe_mismatch(where, "frame", "a frame number", "'" + cells[columns["frame"]] + "'"));
   }
@@ -116,6 +108,27 @@ size_t place_of(const RecordedTouch& touch, const TouchedSequence& sequence) {
   const auto nearest = std::min_element(
       frames.begin(), frames.end(), [&](const FrameName& a, const FrameName& b) { return distance(a) < distance(b); });
   return size_t(nearest - frames.begin());
+}
+
+/// First and last of the frames that a map was made of.
+struct FusedSpan {
+  int64_t first = std::numeric_limits<int64_t>::max(), last = std::numeric_limits<int64_t>::min();
+};
+
+FusedSpan fused_span(const FrameJournal& journal) {
+  FusedSpan span;
+  for (const FusedFrames& run : journal.runs)
+    for (const int64_t frame : run.frames)
+      span.first = std::min(span.first, frame), span.last = std::max(span.last, frame);
+  return span;
+}
+
+/// For a touch without its sequence: throws where it cannot have been recorded with the frames of the map.
+void require_recorded_within(const FusedSpan& span, const RecordedTouch& touch) {
+  if (!touch.frame || span.first > span.last || (*touch.frame >= span.first && *touch.frame <= span.last)) return;
+  throw TouchError(describe_mismatch(
+      "touch", "frame", "one of the map's, " + std::to_string(span.first) + " to " + std::to_string(span.last),
+      std::to_string(*touch.frame)));
 }
 
 /// What a recorded touch asks of the map.
@@ -194,9 +207,11 @@ double stamp_of(const RecordedTouch& touch, const TouchedSequence& sequence) {
 std::vector<TouchOutcome> apply_recorded_touches(Map& map, const std::vector<RecordedTouch>& touches,
                                                  const TouchRequest& defaults, const TouchedSequence* sequence) {
   std::vector<TouchOutcome> outcomes;
+  const FusedSpan span = fused_span(map.frames);
   for (const RecordedTouch& touch : touches) {
     TouchOutcome outcome{touch, std::nullopt, ""};
     try {
+      if (sequence == nullptr) require_recorded_within(span, touch);
       const Resolved asked = resolved(touch, defaults, sequence);
       outcome.effect = apply_touch(map, resolve_touch(map, asked.request, asked.view ? &*asked.view : nullptr));
     } catch (const Error& error) {

@@ -55,9 +55,9 @@ struct TouchOutcome {
 /// Applies recorded touches to a map at their stamps. Touch state is a function of vision counts and journal, so they
 /// are all applied when the frames are fused: each region is then found in the complete map, and it makes no difference
 /// when in the sequence a touch came. `defaults` gives what a row does not say (model, region settings, ...); without a
-/// `sequence` a row needs a point, and a frame number stands for its stamp. With the region rule `mask` the region of a
-/// touch given by frame and pixel is the frame's segment under that pixel. A touch that cannot be applied leaves the
-/// map as it was and says why; the others count.
+/// `sequence` a row needs a point, and a frame number, which must be among the map's, stands for its stamp. With the
+/// region rule `mask` the region of a touch given by frame and pixel is the frame's segment under that pixel. A touch
+/// that cannot be applied leaves the map as it was and says why; the others count.
 std::vector<TouchOutcome> apply_recorded_touches(Map& map, const std::vector<RecordedTouch>& touches,
                                                  const TouchRequest& defaults, const TouchedSequence* sequence);
 

@@ -3,7 +3,6 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -33,12 +32,6 @@ std::vector<std::string> split(const std::string& text, char separator) {
     parts.push_back(text.substr(from, at - from));
   parts.push_back(text.substr(from));
   return parts;
-}
-
-std::optional<double> number(const std::string& text) {
-  double value = 0;
-  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return fault == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
 }
 
 /// Rows and columns by class, gathered cell by cell.
@@ -73,7 +66,7 @@ public:
     if (truth >= 0 && has_row_[size_t(truth)]) problem(at, "true class", "each class once", quoted(name) + " again");
     if (truth >= 0) has_row_[size_t(truth)] = true;
     for (size_t c = 0; c < cells.size(); ++c) {
-      const auto value = number(cells[c]);
+      const auto value = parse_number(cells[c]);
       if (!value || !std::isfinite(*value) || *value < 0)
         problem(at, "number " + std::to_string(c + 1), "a finite number >= 0", quoted(cells[c]));
       else if (truth >= 0 && column_slot_[c] >= 0)

@@ -81,4 +81,27 @@ TEST_CASE("merge writes one map, whatever the order of its arguments, and refuse
   CHECK(run_feltmap("merge --allow-shared-frames " + maps.a + " " + maps.a + " --out " + maps.out).exit_code == 0);
 }
 
+TEST_CASE("a map is replaced only by one that holds all that it holds, or with --force") {
+  const Maps maps;
+  const auto hash_of = [](const std::string& file) { return map_hash(load_map(file)); };
+  const std::string merge = "merge " + maps.a + " " + maps.b + " --out " + maps.out;
+  REQUIRE(run_feltmap(merge).exit_code == 0);
+  const std::string merged = hash_of(maps.out);
+  CHECK(run_feltmap(merge).exit_code == 0);  // again
+
+  const CommandResult lost = run_feltmap("merge " + maps.b + " --out " + maps.out);
+  CHECK(lost.exit_code == 4);
+  CHECK_THAT(lost.err, Contains("out.vdb") && Contains("frames") && Contains("--force"));
+  CHECK(hash_of(maps.out) == merged);
+  CHECK(run_feltmap("merge " + maps.b + " --out " + maps.out + " --force").exit_code == 0);
+  CHECK(hash_of(maps.out) != merged);
+
+  std::ofstream(maps.out) << "notes";
+  const CommandResult notes = run_feltmap("merge " + maps.a + " --out " + maps.out);
+  CHECK(notes.exit_code == 4);
+  CHECK_THAT(notes.err, Contains("no map"));
+  CHECK(std::filesystem::file_size(maps.out) == 5);
+  CHECK(run_feltmap("merge " + maps.a + " --out " + maps.a).exit_code == 0);  // grows in place
+}
+
 }  // namespace felt::test
