@@ -85,7 +85,7 @@ uint64_t verify_map_trailer(const fs::path& path, uint32_t known_version) {
     throw FormatError(describe_mismatch(where, "size", std::to_string(stated) + " bytes before the trailer",
                                         std::to_string(payload)));
   MapTrailer found;
-  std::vector<char> buffer(size_t(1) << 20);
+  std::vector<char> buffer(size_t(std::min<uint64_t>(payload, 1 << 20)));
   for (uint64_t at = 0; at < payload;) {
     const size_t n = size_t(std::min<uint64_t>(buffer.size(), payload - at));
     file.read(buffer.data(), n, at);

@@ -23,7 +23,11 @@ constexpr size_t kIdentifierBytes = 36, kTransformBytes = 15 * sizeof(double);
 class Bytes {
 public:
   Bytes(const OpenedFile& file, uint64_t from, uint64_t end, std::string where)
-      : file_(file), where_(std::move(where)), at_(from), end_(end), buffer_(kBufferBytes) {}
+      : file_(file),
+        where_(std::move(where)),
+        at_(from),
+        end_(end),
+        buffer_(std::min<uint64_t>(end - from, kBufferBytes)) {}
 
   uint64_t at() const { return at_; }
   uint64_t left() const { return end_ - at_; }

@@ -166,10 +166,10 @@ void read_redwood_log(const std::string& bytes) {
   read_frames_of(scratch_folder() / "redwood", "redwood");
 }
 
-/// Points, and the views that are made of them: coarse ones, for those of 512 x 512 pixels take a quarter of a second.
+/// Points, and one of the views that are made of them: a coarse one, for 512 x 512 pixels take a quarter of a second.
 void read_scan(const std::string& bytes) {
   const std::vector<Eigen::Vector3f> points = decode_scan(as_image(bytes), "scan.bin");
-  for (int face = 0; face < kScanFaces; ++face) depth_of_scan(points, face, {16, 16, 15.5, 15.5, 32, 32});
+  depth_of_scan(points, int(points.size()) % kScanFaces, {16, 16, 15.5, 15.5, 32, 32});
 }
 
 /// One scan that has a pose.
