@@ -34,8 +34,8 @@ int run(const Options& options) {
   std::vector<const Map*> pointers;
   for (const std::string& path : options.maps) pointers.push_back(&maps.emplace_back(load_map(path)));
   const auto loaded = Clock::now();
-  require_nothing_lost(options.out, pointers, options.overwrite);
   const Map result = merge(pointers, options.merge);
+  require_nothing_lost(options.out, result, options.overwrite);
   const auto merged = Clock::now();
   const std::string hash = save_map(result, options.out);
   const auto saved = Clock::now();

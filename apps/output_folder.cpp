@@ -15,21 +15,17 @@ namespace felt::apps {
 namespace fs = std::filesystem;
 namespace {
 
-/// What of the journals no source holds, in words; empty where there is nothing.
-std::string missing_from(std::span<const Map* const> sources, const MapJournals& journals) {
-  FrameJournal frames;
+/// What of the journals the map does not hold, in words; empty where there is nothing.
+std::string missing_from(const Map& map, const MapJournals& journals) {
   std::set<uint64_t> touches;
-  for (const Map* source : sources) {
-    frames = joined(frames, source->frames);
-    for (const Touch& touch : source->touches.touches) touches.insert(touch.id);
-  }
+  for (const Touch& touch : map.touches.touches) touches.insert(touch.id);
   const size_t lost_frames =
-      shared_frames(journals.frames, journals.frames).size() - shared_frames(journals.frames, frames).size();
+      shared_frames(journals.frames, journals.frames).size() - shared_frames(journals.frames, map.frames).size();
   const auto lost_touches = std::count_if(journals.touches.touches.begin(), journals.touches.touches.end(),
                                           [&](const Touch& touch) { return !touches.contains(touch.id); });
   if (lost_frames == 0 && lost_touches == 0) return "";
   return "a map with " + std::to_string(lost_frames) + " frames and " + std::to_string(lost_touches) +
-         " touches that the new one would not hold";
+         " touches that the new one does not hold";
 }
 
 }  // namespace
@@ -57,11 +53,11 @@ void require_no_file(const fs::path& file, bool overwrite) {
     throw IoError(describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", "one"));
 }
 
-void require_nothing_lost(const fs::path& file, std::span<const Map* const> sources, bool overwrite) {
+void require_nothing_lost(const fs::path& file, const Map& replacement, bool overwrite) {
   if (overwrite || !fs::is_regular_file(file)) return;
   std::string lost;
   try {
-    lost = missing_from(sources, load_journals(file));
+    lost = missing_from(replacement, load_journals(file));
   } catch (const Error&) {
     lost = "a file that is no map that can be read";
   }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -17,8 +16,8 @@ void prepare_output_folder(const std::filesystem::path& folder, const std::vecto
 /// The same for one file: throws IoError where it exists unless `overwrite`.
 void require_no_file(const std::filesystem::path& file, bool overwrite);
 
-/// For a map that is made of others: throws IoError where `file` exists and is no map, or one with frames or touches
-/// that none of `sources` holds, unless `overwrite`.
-void require_nothing_lost(const std::filesystem::path& file, std::span<const Map* const> sources, bool overwrite);
+/// The same for a file that may be replaced by a map which holds all its frames and touches: throws IoError where it
+/// is no map, or one that holds more, unless `overwrite`.
+void require_nothing_lost(const std::filesystem::path& file, const Map& replacement, bool overwrite);
 
 }  // namespace felt::apps

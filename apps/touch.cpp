@@ -9,7 +9,6 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
-#include "apps/output_folder.h"
 #include "apps/touch_options.h"
 #include "inference/decision.h"
 #include "io/map_file/map_file.h"
@@ -26,7 +25,7 @@ struct TouchOptions : CommonOptions {
   std::string map, at, property, file, out, undo, redo, properties, model = "material", projection = "kl";
   double value = 0, sigma = 0, stamp_s = 0;
   std::optional<double> rho;
-  bool dry_run = false, list = false, overwrite = false;
+  bool dry_run = false, list = false;
   RegionOptions region;
   // A touch given by a frame of the sequence and a pixel.
   std::string sequence, masks;
@@ -164,8 +163,6 @@ TouchRequest request_of(const TouchOptions& options) {
 int run_touch(const TouchOptions& options) {
   if (options.list) return list_touches(options);
   const TouchRequest request = request_of(options);
-  std::error_code fault;
-  const bool in_place = options.out.empty() || std::filesystem::equivalent(options.map, options.out, fault);
   Map map = load_map(options.map);
   use_properties(map, options.properties);
   json out;
@@ -207,9 +204,7 @@ int run_touch(const TouchOptions& options) {
     effects.push_back(apply_touch(map, resolve_touch(map, request, view ? &*view : nullptr)));
     out.update(effect_json(map, effects.back(), request.region));
   }
-  if (const Map* source = &map; !in_place && !options.dry_run)
-    require_nothing_lost(options.out, {&source, 1}, options.overwrite);
-  out["map_hash"] = options.dry_run ? map_hash(map) : save_map(map, in_place ? options.map : options.out);
+  out["map_hash"] = options.dry_run ? map_hash(map) : save_map(map, options.out.empty() ? options.map : options.out);
   // Only what is done is said to be.
   if (options.json) {
     print_json(out);
@@ -265,8 +260,6 @@ void add_touch(CLI::App& app) {
   command.add_option("--rho", options->rho, "Correlation of readings within a region, instead of the property's");
   command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
   command.add_option("--out", options->out, "Write here instead of in place");
-  command.add_flag("--force", options->overwrite,
-                   "Replace the file of --out although it holds frames or touches that this map does not");
   command.add_flag("--dry-run", options->dry_run, "Say what would change and write nothing");
   options->region.add_to(command);
 }
