@@ -5,6 +5,7 @@
 #include <map>
 
 #include "core/error.h"
+#include "core/utf8.h"
 
 namespace felt {
 
@@ -14,6 +15,10 @@ ClassTable::ClassTable(std::vector<ClassInfo> classes) : classes_(std::move(clas
   std::map<std::string, uint16_t> by_name;
   for (size_t row = 0; row < classes_.size(); ++row) {
     const ClassInfo& c = classes_[row];
+    // Whatever a file's text was: escapes of YAML can make other bytes, which a map's tables cannot hold.
+    if (!is_utf8(c.name))
+      problems.push_back(
+          describe_mismatch("class table", "name of id " + std::to_string(c.id), "UTF-8", "other bytes"));
     if (const auto [other, is_new] = by_id.emplace(c.id, c.name); !is_new)
       problems.push_back("class table: id " + std::to_string(c.id) + ": expected unique ids, found it for '" +
                          other->second + "' and '" + c.name + "'");

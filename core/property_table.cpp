@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/utf8.h"
 
 namespace felt {
 namespace {
@@ -36,6 +37,7 @@ PropertyTable::PropertyTable(std::vector<Property> properties) : properties_(std
   for (const Property& p : properties_) {
     const std::string where = "property '" + p.name + "'";
     expect(valid_property_name(p.name), where, "name", "letters, digits, '_', '-' and '.'", "'" + p.name + "'");
+    expect(is_utf8(p.unit), where, "unit", "UTF-8", "other bytes");
     expect(names.insert(p.name).second, where, "name", "unique names", "it twice");
     expect(p.support_lo < p.support_hi, where, "support", "lo < hi",
            number(p.support_lo) + " and " + number(p.support_hi));
@@ -44,6 +46,7 @@ PropertyTable::PropertyTable(std::vector<Property> properties) : properties_(std
            "a positive number", number(p.max_prior_readings));
     for (const auto& [class_name, prior] : p.priors) {
       const std::string row = where + ", class '" + class_name + "'";
+      expect(is_utf8(class_name), where, "names of classes", "UTF-8", "other bytes");
       expect(std::isfinite(prior.mean) && prior.mean >= p.support_lo && prior.mean <= p.support_hi, row, "mean",
              "a number in the support", number(prior.mean));
       expect(std::isfinite(prior.sd) && prior.sd > 0, row, "sd", "a positive number", number(prior.sd));

@@ -4,9 +4,9 @@
 #include <charconv>
 #include <cstdio>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "core/utf8.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -166,11 +166,7 @@ std::vector<double> parse_numbers(std::string_view line, const std::string& wher
 }
 
 void require_utf8(std::string_view text, const std::string& where) {
-  try {
-    (void)nlohmann::json(std::string(text)).dump();
-  } catch (const nlohmann::json::exception&) {
-    throw ConfigError(describe_mismatch(where, "text", "UTF-8", "other bytes"));
-  }
+  if (!is_utf8(text)) throw ConfigError(describe_mismatch(where, "text", "UTF-8", "other bytes"));
 }
 
 }  // namespace felt
