@@ -156,7 +156,7 @@ TEST_CASE("a failed save leaves the map that was there") {
   Map map = test::random_map({.seed = 6, .blocks = 3, .classes = 1});
   save_map(map, path);
   const std::string before = bytes_of(path);
-  map.classes = ClassTable({{1, "not \xff UTF-8", {}, false}});
+  map.frames.runs.push_back({"not \xff UTF-8", "", {0}});
   CHECK_THROWS_AS(save_map(map, path), Error);
   CHECK(bytes_of(path) == before);
   CHECK(std::distance(fs::directory_iterator(directory.path()), {}) == 1);
