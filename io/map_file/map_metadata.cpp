@@ -155,7 +155,7 @@ openvdb::MetaMap to_metadata(const Map& map, const std::string& hash) {
     if (!map.touches.touches.empty())
       metadata.insertMeta(kTouches, openvdb::StringMetadata(touch_journal_json(map.touches)));
   } catch (const json::exception& error) {
-    throw FormatError(describe_mismatch("map", "names in the class table and frame journal", "UTF-8", error.what()));
+    throw FormatError(describe_mismatch("map", "names in the frame journal", "UTF-8", error.what()));
   }
   for (const auto& [key, text] : map.metadata) metadata.insertMeta(kTextPrefix + key, openvdb::StringMetadata(text));
   return metadata;

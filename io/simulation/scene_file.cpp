@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/utf8.h"
 #include "io/files/text_input.h"
 #include "io/simulation/furniture.h"
 
@@ -79,8 +80,8 @@ private:
     return YAML::Node(YAML::NodeType::Sequence);
   }
   std::string text_of(const YAML::Node& node, const std::string& what) {
-    if (node && node.IsScalar()) return node.Scalar();
-    problem(node, what, "a text");
+    if (node && node.IsScalar() && is_utf8(node.Scalar())) return node.Scalar();
+    problem(node, what, "a text in UTF-8");
     return "";
   }
   double number(const YAML::Node& node, const std::string& what, double low, double high) {

@@ -90,8 +90,13 @@ const ClassTable& classes() {
   return table;
 }
 
-void read_classes_csv(const std::string& bytes) { read_class_table(as_file("classes.csv", bytes)); }
-void read_classes_yaml(const std::string& bytes) { read_class_table(as_file("classes.yaml", bytes)); }
+void read_classes(const std::string& name, const std::string& bytes) {
+  const ClassTable table = read_class_table(as_file(name, bytes));
+  require(read_class_table(as_file("written.yaml", class_table_yaml(table))) == table,
+          "a class table changes when written");
+}
+void read_classes_csv(const std::string& bytes) { read_classes("classes.csv", bytes); }
+void read_classes_yaml(const std::string& bytes) { read_classes("classes.yaml", bytes); }
 void read_camera(const std::string& bytes) { read_camera_file(as_file("camera.txt", bytes)); }
 void read_config(const std::string& bytes) { read_reconstruct_config(as_file("config.yaml", bytes)); }
 void read_confusion(const std::string& bytes) { parse_confusion_matrix(bytes, classes(), "confusion.csv"); }
@@ -100,7 +105,10 @@ void read_obj(const std::string& bytes) { parse_obj(bytes, "mesh.obj"); }
 void read_ply(const std::string& bytes) { parse_ply(bytes, "mesh.ply"); }
 void read_point_list(const std::string& bytes) { read_points(as_file("points.csv", bytes)); }
 void read_priors(const std::string& bytes) { fit_priors_json(read_readings_csv(as_file("readings.csv", bytes)), 100); }
-void read_scene_yaml(const std::string& bytes) { parse_scene(bytes, "scene.yaml"); }
+void read_scene_yaml(const std::string& bytes) {
+  const Scene scene = parse_scene(bytes, "scene.yaml");
+  require(parse_scene(scene_json(scene, "{}"), "written").name == scene.name, "a scene changes when written");
+}
 void read_touches_csv(const std::string& bytes) { parse_touches(bytes, "touches.csv"); }
 
 void read_depth(const std::string& bytes) { decode_depth(as_image(bytes), "depth"); }
