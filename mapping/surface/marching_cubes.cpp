@@ -48,6 +48,13 @@ uint64_t pack_bits(const uint8_t flags[8]) {
   return bytes * 0x0102040810204080ull >> 56;
 }
 
+/// Asks for planes ahead of their use: the step from one block's to the next's is one that no processor foresees.
+template <typename Planes>
+void prefetch(const Planes& planes) {
+  const auto* bytes = reinterpret_cast<const char*>(&planes);
+  for (size_t i = 0; i < sizeof planes; i += 64) __builtin_prefetch(bytes + i);
+}
+
 BlockSigns signs_of(const GeometryPlanes& planes, float min_weight) {
   BlockSigns signs;
   uint64_t any_negative = 0, any_positive = 0;
@@ -139,6 +146,31 @@ BlockSurface surface_of(const Neighbors<BlockSigns>& around) {
   return surface;
 }
 
+/// Bit y of the rows of a slice that hold any bit.
+uint32_t rows_of(uint64_t slice) {
+  slice |= slice >> 4;
+  slice |= slice >> 2;
+  slice |= slice >> 1;
+  return uint32_t((slice & 0x0101010101010101ull) * 0x0102040810204080ull >> 56);
+}
+
+/// By x + 1: bit y + 1 of the rows (x, y), x and y in -1 .. 9, that gradients at both ends of the block's vertices
+/// read.
+std::array<uint16_t, 11> rows_read(const BlockSurface& surface) {
+  std::array<uint16_t, 11> rows{};
+  for (int x = 0; x < kBlockDim; ++x) {
+    const uint32_t along_x = rows_of(surface.edges[0][x]), along_y = rows_of(surface.edges[1][x]),
+                   along_z = rows_of(surface.edges[2][x]);
+    // Ends of the edges: (x, y) and the next along their axis. Gradients reach one row further in x and in y.
+    const uint32_t ends = along_x | along_z | along_y | along_y << 1;
+    rows[x] |= uint16_t(ends << 1);
+    rows[x + 1] |= uint16_t(ends | ends << 1 | ends << 2 | along_x << 1);
+    rows[x + 2] |= uint16_t(ends << 1 | along_x | along_x << 1 | along_x << 2);
+    rows[x + 3] |= uint16_t(along_x << 1);
+  }
+  return rows;
+}
+
 /// Signed distances of a block and its surroundings, voxels -1 .. 9 along each axis: what the gradient at both ends of
 /// the block's own edges needs. NaN where not observed.
 class DistanceWindow {
@@ -147,9 +179,11 @@ public:
   static constexpr int kStep[3] = {kSide * kSide, kSide, 1};
   static constexpr int at(int x, int y, int z) { return ((x + 1) * kSide + y + 1) * kSide + z + 1; }
 
-  void load(const Neighbors<GeometryPlanes>& around, float min_weight) {
+  /// Only the rows that `rows_read` names.
+  void load(const Neighbors<GeometryPlanes>& around, float min_weight, const std::array<uint16_t, kSide>& rows) {
     for (int x = -1; x <= 9; ++x)
-      for (int y = -1; y <= 9; ++y) {
+      for (uint32_t left = rows[size_t(x + 1)]; left != 0; left &= left - 1) {
+        const int y = std::countr_zero(left) - 1;
         const GeometryPlanes* const* along_z = &around[neighbor(x >> 3, y >> 3, -1)];
         const int row = voxel_offset(x & 7, y & 7, 0);
         float* to = distance_ + at(x, y, -1);
@@ -209,10 +243,12 @@ public:
     const size_t n = order_.size();
     signs_.resize(n);
     surfaces_.resize(n);
+    around_.resize(n);
     tbb::parallel_for(size_t(0), n, [&](size_t i) { signs_[i] = signs_of(*block(i).geometry, options_.min_weight); });
     tbb::parallel_for(size_t(0), n, [&](size_t i) {
-      if (may_cross(i))
-        surfaces_[i] = surface_of(neighbors<BlockSigns>(i, &kNothing, [&](uint32_t j) { return &signs_[j]; }));
+      if (!may_cross(i)) return;
+      around_[i] = numbers_around(i);
+      surfaces_[i] = surface_of(neighbors<BlockSigns>(i, &kNothing, [&](uint32_t j) { return &signs_[j]; }));
     });
     size_t vertices = 0, triangles = 0;
     bool colored = false;
@@ -233,11 +269,15 @@ public:
     if (edges != nullptr) edges->resize(vertices);
     tbb::parallel_for(size_t(0), n, [&](size_t i) {
       if (surfaces_[i].vertex_count + surfaces_[i].triangle_count == 0) return;
+      if (i + 1 < n && surfaces_[i + 1].vertex_count > 0) {
+        prefetch(*block(i + 1).geometry);
+        if (!mesh.colors.empty() && block(i + 1).color != nullptr) prefetch(*block(i + 1).color);
+      }
       DistanceWindow window;
       window.load(neighbors<GeometryPlanes>(i, nullptr, [&](uint32_t j) { return block(j).geometry; }),
-                  options_.min_weight);
+                  options_.min_weight, rows_read(surfaces_[i]));
       emit_vertices(i, window, mesh, edges);
-      if (surfaces_[i].triangle_count > 0) emit_triangles(i, window, mesh);
+      if (surfaces_[i].triangle_count > 0) emit_triangles(i, mesh);
     });
     return mesh;
   }
@@ -252,16 +292,20 @@ private:
     return found == BlockStore::kNone ? found : rank_[found];
   }
 
+  std::array<uint32_t, 27> numbers_around(size_t i) const {
+    std::array<uint32_t, 27> around;
+    for (int dx = -1; dx <= 1; ++dx)
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dz = -1; dz <= 1; ++dz)
+          around[neighbor(dx, dy, dz)] = neighbor(dx, dy, dz) == kSelf ? uint32_t(i) : find(i, dx, dy, dz);
+    return around;
+  }
+
   template <typename T, typename Get>
   Neighbors<T> neighbors(size_t i, const T* absent, Get get) const {
     Neighbors<T> around;
-    for (int dx = -1; dx <= 1; ++dx)
-      for (int dy = -1; dy <= 1; ++dy)
-        for (int dz = -1; dz <= 1; ++dz) {
-          const int at = neighbor(dx, dy, dz);
-          const uint32_t found = at == kSelf ? uint32_t(i) : find(i, dx, dy, dz);
-          around[at] = found == BlockStore::kNone ? absent : get(found);
-        }
+    for (size_t at = 0; at < around.size(); ++at)
+      around[at] = around_[i][at] == BlockStore::kNone ? absent : get(around_[i][at]);
     return around;
   }
 
@@ -286,7 +330,7 @@ private:
     uint32_t vertex = surface.vertex_base;
     for (int axis = 0; axis < 3; ++axis) {
       const int step = DistanceWindow::kStep[axis];
-      const uint32_t after = find(i, axis == 0, axis == 1, axis == 2);
+      const uint32_t after = around_[i][neighbor(axis == 0, axis == 1, axis == 2)];
       const ColorPlanes* color_after = after == BlockStore::kNone ? nullptr : block(after).color;
       for (int x = 0; x < kBlockDim; ++x)
         for (uint64_t bits = surface.edges[axis][x]; bits != 0; bits &= bits - 1, ++vertex) {
@@ -318,7 +362,7 @@ private:
     }
   }
 
-  void emit_triangles(size_t i, const DistanceWindow& window, TriangleMesh& mesh) const {
+  void emit_triangles(size_t i, TriangleMesh& mesh) const {
     // Vertex number of every edge that the block's cells touch, by axis and voxel 0 .. 8; only crossing edges are
     // written and read.
     constexpr int kSide = kBlockDim + 1;
@@ -326,7 +370,7 @@ private:
     const BlockSurface& surface = surfaces_[i];
     for (int d = 0; d < 8; ++d) {
       const int dx = d >> 2, dy = d >> 1 & 1, dz = d & 1;
-      const uint32_t j = d == 0 ? uint32_t(i) : find(i, dx, dy, dz);
+      const uint32_t j = around_[i][neighbor(dx, dy, dz)];
       if (j == BlockStore::kNone) continue;
       const BlockSurface& owner = surfaces_[j];
       // Of a neighbour only the voxels of the shared side: the first slice, row or column.
@@ -338,15 +382,15 @@ private:
             numbers[axis][((x + 8 * dx) * kSide + y + 8 * dy) * kSide + z + 8 * dz] = owner.vertex_number(axis, x, bit);
           }
     }
+    Rows negative;
+    gather_rows(neighbors<BlockSigns>(i, &kNothing, [&](uint32_t j) { return &signs_[j]; }), &BlockSigns::negative,
+                negative);
     const auto& cases = cube_cases();
     Triangle* out = mesh.triangles.data() + surface.triangle_base;
     for (int x = 0; x < kBlockDim; ++x)
       for (uint64_t bits = surface.cells[x]; bits != 0; bits &= bits - 1) {
         const int bit = std::countr_zero(bits), y = bit >> 3, z = bit & 7;
-        int pattern = 0;
-        for (int c = 0; c < 8; ++c)
-          pattern |= int(window[DistanceWindow::at(x + (c >> 2), y + (c >> 1 & 1), z + (c & 1))] < 0) << c;
-        const CubeCase& cube = cases[pattern];
+        const CubeCase& cube = cases[corner_pattern(negative, x + 1, y + 1, z + 1)];
         const auto vertex = [&](int e) {
           const CubeEdge& edge = kCubeEdges[cube.edge[e]];
           const int dx = edge.corner >> 2, dy = edge.corner >> 1 & 1, dz = edge.corner & 1;
@@ -362,6 +406,7 @@ private:
   std::vector<uint32_t> rank_;   ///< the inverse
   std::vector<BlockSigns> signs_;
   std::vector<BlockSurface> surfaces_;
+  std::vector<std::array<uint32_t, 27>> around_;  ///< canonical numbers around blocks that the surface may cross
 };
 
 }  // namespace

@@ -15,6 +15,7 @@
 using namespace felt;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
+using Eigen::Vector3i;
 
 namespace {
 
@@ -296,4 +297,44 @@ TEST_CASE("normals use what was observed on one side where the other was not") {
   const TriangleMesh mesh = extract_mesh(map);
   REQUIRE_FALSE(mesh.normals.empty());
   for (const Vector3f& n : mesh.normals) CHECK((n.cast<double>() - normal).norm() < 1e-5);
+}
+
+TEST_CASE("normals are the gradient between the two voxels, of whatever was observed around each") {
+  for (const double share : {0.7, 0.9, 1.0}) {
+    Map map(0.5, 2.0);
+    std::mt19937 random(11);
+    std::uniform_real_distribution<float> value(-1, 1), uniform(0, 1);
+    // Few edges, so that most rows of a block hold none.
+    for (int x = -10; x < 14; ++x)
+      for (int y = -9; y < 12; ++y)
+        for (int z = -12; z < 10; ++z)
+          test::set_voxel(map, {x, y, z}, uniform(random) < 0.05f ? -0.5f : 1.1f + value(random),
+                          uniform(random) < share ? 1.0f : 0.0f);
+    const auto distance = [&](const Vector3i& v) {
+      const Block* block = map.store.get(block_of_voxel({v.x(), v.y(), v.z()}));
+      const int i = offset_in_block({v.x(), v.y(), v.z()});
+      return block == nullptr || block->geometry->weight[i] == 0 ? std::nan("") : double(block->geometry->tsdf[i]);
+    };
+    const auto gradient = [&](const Vector3i& v) {
+      Vector3d slopes;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double low = distance(v - Vector3i::Unit(axis)), here = distance(v),
+                     high = distance(v + Vector3i::Unit(axis));
+        const bool has_low = !std::isnan(low), has_high = !std::isnan(high);
+        slopes[axis] = has_low && has_high ? 0.5 * (high - low) : has_low ? here - low : has_high ? high - here : 0;
+      }
+      return slopes;
+    };
+    std::vector<VertexEdge> edges;
+    const TriangleMesh mesh = extract_mesh(map, {}, &edges);
+    CHECK(mesh.normals.size() == edges.size());
+    for (size_t i = 0; i < edges.size(); ++i) {
+      const Vector3i low(edges[i].voxel.x, edges[i].voxel.y, edges[i].voxel.z);
+      const Vector3d expected =
+          (1 - edges[i].t) * gradient(low) + edges[i].t * gradient(low + Vector3i::Unit(edges[i].axis));
+      if (expected.norm() < 0.01) continue;
+      REQUIRE((mesh.normals[i].cast<double>() - expected.normalized()).norm() < 1e-4);
+    }
+    CHECK(edges.size() > 100);
+  }
 }
