@@ -19,13 +19,9 @@ std::map<int64_t, FrameRecord*> frames_by_number(SequenceListing& listing) {
   return frames;
 }
 
-/// The entries of a folder in a fixed order.
-std::vector<fs::path> entries_of(const fs::path& folder) {
-  std::error_code fault;
-  std::vector<fs::path> entries;
-  for (fs::directory_iterator at(folder, fault), end; !fault && at != end; at.increment(fault))
-    entries.push_back(at->path());
-  if (fault) throw IoError(describe_mismatch(folder.string(), "folder", "a readable folder", fault.message()));
+/// In a fixed order: sums of probabilities depend on it.
+std::vector<fs::path> sorted_entries_of(const fs::path& folder) {
+  std::vector<fs::path> entries = entries_of(folder);
   std::sort(entries.begin(), entries.end());
   return entries;
 }
@@ -50,7 +46,7 @@ bool attach_detections(const std::vector<fs::path>& entries, SequenceListing& li
     const auto number = trailing_number(entry.filename().string());
     const auto frame = number ? frames.find(*number) : frames.end();
     if (frame == frames.end()) continue;
-    for (const fs::path& file : entries_of(entry))
+    for (const fs::path& file : sorted_entries_of(entry))
       if (const auto detection = detection_of(file)) frame->second->class_maps.push_back(*detection), any = true;
   }
   return any;
@@ -80,7 +76,7 @@ bool attach_class_maps(const std::vector<fs::path>& entries, SequenceListing& li
 }  // namespace
 
 void attach_probabilities(const fs::path& folder, SequenceListing& listing) {
-  const std::vector<fs::path> entries = entries_of(folder);
+  const std::vector<fs::path> entries = sorted_entries_of(folder);
   for (FrameRecord& frame : listing.frames) {
     frame.probabilities.path.clear();
     frame.class_maps.clear();

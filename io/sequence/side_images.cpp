@@ -18,17 +18,14 @@ struct NamedImages {
 };
 
 NamedImages images_in(const fs::path& folder, bool folders) {
-  std::error_code fault;
-  fs::directory_iterator files(folder, fault);
-  if (fault) throw IoError(describe_mismatch(folder.string(), "folder", "a readable folder", fault.message()));
   NamedImages images;
   std::map<int64_t, int> uses;
-  for (const fs::directory_entry& entry : files) {
-    if (entry.path().extension() != ".png" && !(folders && entry.is_directory())) continue;
-    const std::string stem = entry.path().stem().string();
-    images.by_stem[stem] = entry.path();
+  for (const fs::path& entry : entries_of(folder)) {
+    if (entry.extension() != ".png" && !(folders && fs::is_directory(entry))) continue;
+    const std::string stem = entry.stem().string();
+    images.by_stem[stem] = entry;
     if (const auto number = trailing_number(stem.substr(0, stem.find('.')))) {
-      images.by_number[*number] = entry.path();
+      images.by_number[*number] = entry;
       ++uses[*number];
     }
   }
@@ -40,8 +37,8 @@ NamedImages images_in(const fs::path& folder, bool folders) {
 /// PNG images of a folder by name, numbers within names in their order.
 std::vector<ImageSource> masks_in(const fs::path& folder) {
   std::vector<ImageSource> masks;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-    if (entry.path().extension() == ".png") masks.push_back({.path = entry.path()});
+  for (const fs::path& entry : entries_of(folder))
+    if (entry.extension() == ".png") masks.push_back({.path = entry});
   const auto key = [](const ImageSource& mask) {
     const std::string stem = mask.path.stem().string();
     return std::pair(parse_integer(stem).value_or(-1), stem);

@@ -19,14 +19,16 @@ std::optional<int64_t> number_between(const std::string& name, const std::string
   return std::nullopt;
 }
 
-fs::directory_iterator open_folder(const fs::path& folder) {
-  std::error_code fault;
-  fs::directory_iterator files(folder, fault);
-  if (fault) throw IoError(describe_mismatch(folder.string(), "folder", "a readable folder", fault.message()));
-  return files;
-}
-
 }  // namespace
+
+std::vector<fs::path> entries_of(const fs::path& folder) {
+  std::error_code fault;
+  std::vector<fs::path> entries;
+  for (fs::directory_iterator at(folder, fault), end; !fault && at != end; at.increment(fault))
+    entries.push_back(at->path());
+  if (fault) throw IoError(describe_mismatch(folder.string(), "folder", "a readable folder", fault.message()));
+  return entries;
+}
 
 std::optional<int64_t> trailing_number(std::string_view stem) {
   const size_t last = stem.find_last_not_of("0123456789");
@@ -37,11 +39,11 @@ std::map<int64_t, fs::path> numbered_files(const fs::path& folder, const std::st
                                            const std::vector<std::string>& suffixes) {
   std::map<int64_t, fs::path> found;
   if (!fs::is_directory(folder)) return found;
-  for (const fs::directory_entry& entry : open_folder(folder)) {
-    const std::string name = entry.path().filename().string();
+  for (const fs::path& entry : entries_of(folder)) {
+    const std::string name = entry.filename().string();
     const auto number = number_between(name, prefix, suffixes);
     if (!number) continue;
-    const auto [other, is_new] = found.emplace(*number, entry.path());
+    const auto [other, is_new] = found.emplace(*number, entry);
     if (!is_new)
       throw FormatError(describe_mismatch(folder.string(), "frame " + std::to_string(*number), "one file",
                                           "'" + other->second.filename().string() + "' and '" + name + "'"));

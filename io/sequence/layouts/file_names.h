@@ -13,6 +13,9 @@ namespace felt {
 /// Number that ends a file's stem: 12 for "depth000012.png", "12.jpg" and "frame-000012". Nothing where there is none.
 std::optional<int64_t> trailing_number(std::string_view stem);
 
+/// What lies directly in `folder`, in no particular order. Throws IoError where it cannot be listed to its end.
+std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder);
+
 /// Files directly in `folder` whose name is `prefix`, a number, `suffix` (one of `suffixes`), by that number. Numbers
 /// sort as numbers, whether or not they are padded with zeros. Empty where the folder is absent.
 /// Throws IoError where the folder cannot be listed and FormatError where two names hold one number.

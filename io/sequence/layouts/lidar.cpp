@@ -19,9 +19,8 @@ fs::path scan_folder(const fs::path& path) { return fs::is_directory(path / "vel
 std::vector<fs::path> scans_of(const fs::path& path) {
   if (fs::is_regular_file(path)) return {path};
   std::vector<fs::path> scans;
-  std::error_code fault;
-  for (fs::directory_iterator at(scan_folder(path), fault), end; !fault && at != end; at.increment(fault))
-    if (at->path().extension() == ".bin") scans.push_back(at->path());
+  for (const fs::path& entry : entries_of(scan_folder(path)))
+    if (entry.extension() == ".bin") scans.push_back(entry);
   // By number where names end in one, else by name.
   std::sort(scans.begin(), scans.end(), [](const fs::path& a, const fs::path& b) {
     const auto n = trailing_number(a.stem().string()), m = trailing_number(b.stem().string());

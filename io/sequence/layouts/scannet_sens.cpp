@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "io/sequence/camera_file.h"
 #include "io/sequence/layouts.h"
+#include "io/sequence/layouts/file_names.h"
 
 // ScanNet's .sens container, version 4 (Dai et al., CVPR 2017; layout as its SensorData reader documents it): a header,
 // then per frame a pose, two stamps, two sizes, the compressed colour and depth. Opening walks over the frame headers
@@ -69,9 +70,8 @@ Intrinsics intrinsics_of(const Eigen::Matrix4d& matrix, const std::string& where
 std::vector<fs::path> containers_at(const fs::path& path) {
   if (!fs::is_directory(path)) return path.extension() == ".sens" ? std::vector{path} : std::vector<fs::path>{};
   std::vector<fs::path> found;
-  std::error_code fault;
-  for (fs::directory_iterator at(path, fault), end; !fault && at != end; at.increment(fault))
-    if (at->path().extension() == ".sens") found.push_back(at->path());
+  for (const fs::path& entry : entries_of(path))
+    if (entry.extension() == ".sens") found.push_back(entry);
   return found;
 }
 

@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -85,10 +87,11 @@ bool ends_in(const fs::path& path, const fs::path& render_path) {
 std::vector<fs::path> protobufs_near(const fs::path& folder) {
   std::vector<fs::path> files;
   const auto add = [&](const fs::path& place) {
+    // Folders above are perhaps not the data set's, and not for us to read.
+    if (!fs::is_directory(place) || access(place.c_str(), R_OK | X_OK) != 0) return;
     std::vector<fs::path> found;
-    std::error_code fault;
-    for (fs::directory_iterator at(place, fault), end; !fault && at != end; at.increment(fault))
-      if (at->path().extension() == ".pb") found.push_back(at->path());
+    for (const fs::path& entry : entries_of(place))
+      if (entry.extension() == ".pb") found.push_back(entry);
     std::sort(found.begin(), found.end());
     files.insert(files.end(), found.begin(), found.end());
   };

@@ -16,11 +16,11 @@ constexpr const char *kPrefix = "frame-", *kDepth = ".depth";
 /// The folder that holds the frames: `path` or its only `seq-*`.
 fs::path frame_folder(const fs::path& path) {
   if (has_depth_files(path, kPrefix, kDepth)) return path;
+  if (!fs::is_directory(path)) return {};
   std::vector<fs::path> sequences;
-  std::error_code fault;
-  for (fs::directory_iterator at(path, fault), end; !fault && at != end; at.increment(fault))
-    if (at->path().filename().string().starts_with("seq-") && has_depth_files(at->path(), kPrefix, kDepth))
-      sequences.push_back(at->path());
+  for (const fs::path& entry : entries_of(path))
+    if (entry.filename().string().starts_with("seq-") && has_depth_files(entry, kPrefix, kDepth))
+      sequences.push_back(entry);
   if (sequences.size() > 1)
     throw FormatError(describe_mismatch(path.string(), "sequence", "one folder seq-*; name the one to read",
                                         std::to_string(sequences.size()) + " of them"));
