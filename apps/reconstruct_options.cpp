@@ -64,6 +64,19 @@ private:
 
 bool positive(double value) { return std::isfinite(value) && value > 0; }
 
+/// Beyond the truncation nothing says how far a voxel is from the surface, and free space would take labels.
+void require_bands_that_fit(const ReconstructOptions& options) {
+  const double voxel_m = options.voxel_size_m, truncation_m = options.truncation_m;
+  if (!positive(voxel_m)) return;
+  if (!(truncation_m >= voxel_m))
+    throw ConfigError(describe_mismatch("--truncation", "band around the surface",
+                                        "at least one voxel, " + text_of(voxel_m) + " m",
+                                        text_of(truncation_m) + " m"));
+  if (const auto& band = options.labels.band_vox; band && *band * voxel_m > truncation_m * (1 + 1e-6))
+    throw ConfigError(describe_mismatch("--label-band", "voxels",
+                                        "at most the truncation, " + text_of(truncation_m / voxel_m), text_of(*band)));
+}
+
 }  // namespace
 
 void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
@@ -149,9 +162,7 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   problems.attempt([&] {
     options.truncation = a.truncation.empty() ? file.truncation.value_or("4vox") : a.truncation;
     options.truncation_m = parse_truncation(options.truncation, options.voxel_size_m, "--truncation");
-    if (positive(options.voxel_size_m) && !(options.truncation_m >= options.voxel_size_m))
-      throw ConfigError(describe_mismatch("--truncation", "band around the surface", "at least one voxel",
-                                          text_of(options.truncation_m) + " m"));
+    require_bands_that_fit(options);
   });
 
   IntegrationConfig& fusion = options.fusion;
@@ -179,6 +190,7 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   problems.expect(a.perception.instances.empty() || reading.read_instances, "--masks", "what they are for",
                   "--vote instances or --instances", "neither");
   problems.throw_if_any();
+  require_bands_that_fit(options);
   return options;
 }
 
@@ -186,6 +198,7 @@ void adopt_sequence_defaults(const SequenceInfo& info, ReconstructOptions& optio
   if (info.voxel_size_m > 0 && !options.voxel_size_given) {
     options.voxel_size_m = info.voxel_size_m;
     options.truncation_m = parse_truncation(options.truncation, options.voxel_size_m, "--truncation");
+    require_bands_that_fit(options);
   }
   if (info.max_depth_m > 0 && !options.max_depth_given) options.fusion.max_depth_m = float(info.max_depth_m);
 }

@@ -125,6 +125,10 @@ TEST_CASE("label settings come from the command line or the file, are checked, a
   CHECK(bad.exit_code == 3);
   for (const char* option : {"--label-band", "--label-evidence", "--label-cap", "--class-prior", "--label-turn"})
     CHECK_THAT(bad.err, Contains(option));
+  const CommandResult wide = recording.reconstruct("--label-band 4.5");
+  CHECK(wide.exit_code == 3);
+  CHECK_THAT(wide.err, Contains("--label-band: voxels: expected at most the truncation, 4, found 4.5"));
+  CHECK(recording.reconstruct("--label-band 4.5 --truncation 5vox").exit_code == 0);
   const CommandResult unknown = recording.reconstruct("--ignore-classes person");
   CHECK(unknown.exit_code == 3);
   CHECK_THAT(unknown.err, Contains("--ignore-classes") && Contains("wall, floor, sofa"));

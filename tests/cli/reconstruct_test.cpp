@@ -150,6 +150,20 @@ TEST_CASE("every setting that cannot be used is named at once, with exit code 3"
   }
 }
 
+TEST_CASE("a truncation must hold at least one voxel, also of the size that a layout brings") {
+  const TemporaryDirectory folder;
+  // One scan of a range sensor, 16 bytes a point: these have voxels of 20 cm unless told otherwise.
+  fs::create_directory(folder.path() / "scan");
+  std::ofstream(folder.path() / "scan/000000.bin") << std::string(160, 'A');
+  const CommandResult own = reconstruct(folder.path() / "scan", folder.path() / "out", "--truncation 0.1");
+  CHECK(own.exit_code == 3);
+  CHECK_THAT(own.err, Catch::Matchers::Contains("--truncation") &&
+                          Catch::Matchers::Contains("at least one voxel, 0.2 m, found 0.1 m"));
+  const CommandResult given =
+      reconstruct(folder.path() / "scan", folder.path() / "out", "--truncation 0.1 --voxel-size 0.05");
+  CHECK(given.exit_code != 3);
+}
+
 TEST_CASE("a map that would not fit into memory is refused with the estimate") {
   const TemporaryDirectory out;
   const CommandResult result = reconstruct(boxes(), out.path(), "--voxel-size 0.00002");
