@@ -6,7 +6,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
-#include "apps/output_folder.h"
+#include "apps/output_files.h"
 #include "apps/progress.h"
 #include "core/error.h"
 #include "io/files/atomic_file.h"

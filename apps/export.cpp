@@ -8,7 +8,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
-#include "apps/output_folder.h"
+#include "apps/output_files.h"
 #include "apps/touch_options.h"
 #include "core/error.h"
 #include "io/map_file/map_file.h"

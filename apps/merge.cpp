@@ -8,7 +8,7 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
-#include "apps/output_folder.h"
+#include "apps/output_files.h"
 #include "io/map_file/map_file.h"
 #include "mapping/maps/merge.h"
 

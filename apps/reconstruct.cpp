@@ -16,7 +16,7 @@
 #include "apps/fuse_sequence.h"
 #include "apps/interrupt.h"
 #include "apps/label_options.h"
-#include "apps/output_folder.h"
+#include "apps/output_files.h"
 #include "apps/progress.h"
 #include "apps/reconstruct_options.h"
 #include "apps/recorded_touches.h"

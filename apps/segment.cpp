@@ -8,7 +8,7 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/interrupt.h"
-#include "apps/output_folder.h"
+#include "apps/output_files.h"
 #include "apps/perception_options.h"
 #include "apps/progress.h"
 #include "core/error.h"

@@ -1,4 +1,4 @@
-#include "apps/output_folder.h"
+#include "apps/output_files.h"
 
 #include <unistd.h>
 
