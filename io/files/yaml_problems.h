@@ -1,6 +1,5 @@
 #pragma once
 
-#include <filesystem>
 #include <set>
 #include <string>
 #include <vector>
@@ -11,20 +10,26 @@ class Node;
 
 namespace felt {
 
-/// Gathers everything that is wrong with a YAML file, so that it can be said at once.
+/// Gathers everything that is wrong with a YAML document, so that it can be said at once.
 class YamlProblems {
 public:
-  explicit YamlProblems(std::filesystem::path file) : file_(std::move(file)) {}
+  /// `where`: the document's file.
+  explicit YamlProblems(std::string where) : where_(std::move(where)) {}
 
-  /// Adds "<file>:<line of `at`>: <what>: expected <expected>, found <found>".
+  /// "<where>:<line of the node>"; for an undefined node, of the table that `refuse_unknown` looked at last.
+  std::string place(const YAML::Node& node) const;
+  /// Adds "<place of `at`>: <what>: expected <expected>, found <found>".
   void problem(const YAML::Node& at, const std::string& what, const std::string& expected, const std::string& found);
-  /// Adds a problem for each key of a table that is not `known`.
+  /// The same where what `at` holds was found.
+  void problem(const YAML::Node& at, const std::string& what, const std::string& expected);
+  /// Adds a problem for each key of a table that is not `known`, and for one that comes again.
   void refuse_unknown(const YAML::Node& table, const std::set<std::string>& known);
 
   std::vector<std::string> problems;
 
 private:
-  std::filesystem::path file_;
+  std::string where_;
+  int table_line_ = 1;
 };
 
 }  // namespace felt

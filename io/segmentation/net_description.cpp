@@ -26,7 +26,7 @@ public:
     const YAML::Node node = parent[key];
     if (!node) return node;
     if (!node.IsMap()) {
-      problem(node, key, "keys and values", "something else");
+      problem(node, key, "keys and values");
       return YAML::Node(YAML::NodeType::Undefined);
     }
     refuse_unknown(node, known);
@@ -36,7 +36,7 @@ public:
     const YAML::Node node = parent ? parent[key] : YAML::Node(YAML::NodeType::Undefined);
     if (!node) return otherwise;
     if (node.IsScalar() && !node.Scalar().empty()) return node.Scalar();
-    problem(node, key, "a text", "something else");
+    problem(node, key, "a text");
     return otherwise;
   }
   /// Index of the word under `key` among `words`.
@@ -59,8 +59,7 @@ public:
       const YAML::Node entry = list ? node[i] : node;
       const auto number = entry.IsScalar() ? parse_number(entry.Scalar()) : std::nullopt;
       if (!number || !std::isfinite(*number) || (positive && !(*number > 0))) {
-        problem(node, key, std::string(positive ? "a number above 0" : "a number") + ", or three of them, one a plane",
-                "something else");
+        problem(node, key, std::string(positive ? "a number above 0" : "a number") + ", or three of them, one a plane");
         break;
       }
       values[i] = float(*number);
@@ -79,8 +78,7 @@ void read_size(const YAML::Node& input, NetDescription& net, Reader& reader) {
     good = number && *number >= 1 && *number <= kMostPixelsAcross;
     if (good) sides[i] = *number;
   }
-  if (!good)
-    reader.problem(size, "size", "[width, height] from 1 to " + std::to_string(kMostPixelsAcross), "something else");
+  if (!good) reader.problem(size, "size", "[width, height] from 1 to " + std::to_string(kMostPixelsAcross));
   net.width = int(sides[0]), net.height = int(sides[1]);
 }
 
@@ -98,7 +96,7 @@ void read_classes(const YAML::Node& root, const fs::path& folder, NetDescription
     for (LineReader lines(text, file); lines.next();) net.classes.emplace_back(lines.line());
   } else if (node.IsSequence()) {
     for (const YAML::Node& name : node) {
-      if (!name.IsScalar() || name.Scalar().empty()) reader.problem(name, "classes", "a name", "something else");
+      if (!name.IsScalar() || name.Scalar().empty()) reader.problem(name, "classes", "a name");
       net.classes.push_back(name.IsScalar() ? name.Scalar() : "");
     }
   }
@@ -112,12 +110,12 @@ void read_mapping(const YAML::Node& root, NetDescription& net, Reader& reader) {
   const YAML::Node node = root["map"];
   if (!node) return;
   if (!node.IsMap()) {
-    reader.problem(node, "map", "network class: class of the map, or none", "something else");
+    reader.problem(node, "map", "network class: class of the map, or none");
     return;
   }
   for (const auto& entry : node) {
     if (!entry.first.IsScalar() || !entry.second.IsScalar()) {
-      reader.problem(entry.first, "map", "two names", "something else");
+      reader.problem(entry.first, "map", "two names");
       continue;
     }
     const std::string& from = entry.first.Scalar();
@@ -140,7 +138,7 @@ NetDescription read_net_description(const fs::path& path) {
   NetDescription net;
   net.described_in = path;
   const std::string content = read_whole_file(path, kLimitBytes);
-  Reader reader(path);
+  Reader reader(path.string());
   try {
     const YAML::Node root = YAML::Load(content);
     if (!root.IsMap())

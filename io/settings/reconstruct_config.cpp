@@ -12,6 +12,7 @@
 
 #include "core/error.h"
 #include "io/files/text_input.h"
+#include "io/files/yaml_problems.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -195,11 +196,9 @@ ReconstructConfig read_reconstruct_config(const fs::path& path) {
   ReconstructConfig config;
   const std::string content = read_whole_file(path, kLimitBytes);
   const std::map<std::string, ReadValue> readers = readers_of(config, path.parent_path());
-  std::vector<std::string> known, problems;
+  std::vector<std::string> known;
   for (const auto& [key, reader] : readers) known.push_back(key);
-  const auto line_of = [&](const YAML::Node& node) {
-    return path.string() + ":" + std::to_string(node.Mark().line + 1);
-  };
+  YamlProblems found(path.string());
   try {
     const YAML::Node root = YAML::Load(content);
     if (!root.IsMap() && !root.IsNull())
@@ -211,24 +210,23 @@ ReconstructConfig read_reconstruct_config(const fs::path& path) {
       const auto reader = readers.find(key);
       if (reader == readers.end()) {
         const std::string near = nearest_word(key, known);
-        problems.push_back(describe_mismatch(line_of(entry.first), "key",
-                                             near.empty() ? "a known key" : "'" + near + "'", "'" + key + "'"));
+        found.problem(entry.first, "key", near.empty() ? "a known key" : "'" + near + "'", "'" + key + "'");
         continue;
       }
       if (!seen.insert(key).second) {
-        problems.push_back(describe_mismatch(line_of(entry.first), "key", "each once", "'" + key + "' again"));
+        found.problem(entry.first, "key", "each once", "'" + key + "' again");
         continue;
       }
       try {
-        reader->second(entry.second, line_of(entry.first) + ": " + key);
+        reader->second(entry.second, found.place(entry.first) + ": " + key);
       } catch (const ConfigError& fault) {
-        problems.push_back(fault.what());
+        found.problems.push_back(fault.what());
       }
     }
   } catch (const YAML::Exception& fault) {
-    problems.push_back(path.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
+    found.problems.push_back(path.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
   }
-  if (!problems.empty()) throw ConfigError(problems);
+  if (!found.problems.empty()) throw ConfigError(found.problems);
   return config;
 }
 

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/utf8.h"
 #include "io/files/text_input.h"
+#include "io/files/yaml_problems.h"
 #include "io/simulation/furniture.h"
 
 namespace felt {
@@ -20,19 +21,16 @@ using Eigen::Vector3d;
 constexpr const char* kShapes[] = {"plane", "box", "sphere", "cylinder"};
 constexpr const char* kPatterns[] = {"plain", "checker", "noise", "wood", "tiles", "stripes", "picture"};
 
-std::string quoted(const std::string& text) { return std::string(1, '\'').append(text, 0, 60).append(1, '\''); }
-
-/// Walks the document and gathers problems with path:line.
-class SceneParser {
+class SceneParser : private YamlProblems {
 public:
-  explicit SceneParser(std::string where) : where_(std::move(where)) {}
+  using YamlProblems::YamlProblems;
 
-  Scene parse(const std::string& text) {
+  Scene parse(const std::string& text, const std::string& where) {
     YAML::Node document;
     try {
       document = YAML::Load(text);
     } catch (const YAML::Exception& e) {
-      throw ConfigError(where_ + ":" + std::to_string(e.mark.line + 1) + ": " + e.msg);
+      throw ConfigError(where + ":" + std::to_string(e.mark.line + 1) + ": " + e.msg);
     }
     const YAML::Node root = document.IsMap() && document["scene"] ? document["scene"] : document;
     scene_.semantics = simulated_semantics();
@@ -45,32 +43,17 @@ public:
       for (const YAML::Node& node : list(root, "primitives")) primitive(node);
       for (const YAML::Node& node : list(root, "path")) way_point(node);
     }
-    if (!problems_.empty()) throw ConfigError(problems_);
+    if (!problems.empty()) throw ConfigError(problems);
     return std::move(scene_);
   }
 
 private:
-  void problem(const YAML::Node& node, const std::string& what, const std::string& expected) {
-    const std::string found = !node               ? "nothing"
-                              : node.IsScalar()   ? quoted(node.Scalar())
-                              : node.IsMap()      ? "a mapping"
-                              : node.IsSequence() ? "a list"
-                                                  : "nothing";
-    const int line = node ? node.Mark().line + 1 : parent_line_;
-    problems_.push_back(describe_mismatch(where_ + ":" + std::to_string(line), what, expected, found));
-  }
   bool check_keys(const YAML::Node& node, const std::set<std::string>& known) {
     if (!node.IsMap()) {
       problem(node, "scene", "a mapping");
       return false;
     }
-    parent_line_ = node.Mark().line + 1;
-    for (const auto& entry : node)
-      if (!entry.first.IsScalar() || !known.contains(entry.first.Scalar())) {
-        std::string names;
-        for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
-        problem(entry.first, "key", "one of " + names);
-      }
+    refuse_unknown(node, known);
     return true;
   }
   YAML::Node list(const YAML::Node& parent, const char* key) {
@@ -163,10 +146,7 @@ private:
     scene_.path.push_back(point);
   }
 
-  std::string where_;
   Scene scene_;
-  int parent_line_ = 1;
-  std::vector<std::string> problems_;
 };
 
 nlohmann::ordered_json array_of(const Vector3d& v) { return nlohmann::ordered_json::array({v.x(), v.y(), v.z()}); }
@@ -178,7 +158,7 @@ const std::string& name_of(const ClassTable& classes, uint16_t id) {
 
 }  // namespace
 
-Scene parse_scene(const std::string& text, const std::string& where) { return SceneParser(where).parse(text); }
+Scene parse_scene(const std::string& text, const std::string& where) { return SceneParser(where).parse(text, where); }
 
 Scene read_scene(const std::filesystem::path& file) {
   return parse_scene(read_file_or_pipe(file, 16 << 20), file.string());

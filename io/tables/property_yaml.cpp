@@ -9,19 +9,15 @@
 
 #include "core/error.h"
 #include "io/files/text_input.h"
+#include "io/files/yaml_problems.h"
 
 namespace felt {
 namespace {
 
-/// Collects problems with path:line while walking the document.
-class Walker {
+class Walker : public YamlProblems {
 public:
-  explicit Walker(std::string where) : where_(std::move(where)) {}
+  using YamlProblems::YamlProblems;
 
-  std::string at(const YAML::Node& node) const { return where_ + ":" + std::to_string(node.Mark().line + 1); }
-  void problem(const YAML::Node& node, const std::string& what, const std::string& expected) {
-    problems_.push_back(describe_mismatch(at(node), what, expected, shown(node)));
-  }
   void number(const YAML::Node& node, const std::string& what, double& value) {
     double read;
     if (node.IsScalar() && YAML::convert<double>::decode(node, read) && !std::isnan(read))
@@ -43,21 +39,9 @@ public:
       if (seen.insert(key).second)
         visit(key, entry.first, entry.second);
       else
-        problems_.push_back(describe_mismatch(at(entry.first), what, "each key once", "'" + key + "' again"));
+        problem(entry.first, what, "each key once", "'" + key + "' again");
     }
   }
-  std::vector<std::string>& problems() { return problems_; }
-
-private:
-  static std::string shown(const YAML::Node& node) {
-    if (node.IsScalar()) {
-      std::string quoted(1, '\'');
-      return quoted.append(node.Scalar(), 0, 60).append(1, '\'');
-    }
-    return node.IsMap() ? "a mapping" : node.IsSequence() ? "a list" : "nothing";
-  }
-  std::string where_;
-  std::vector<std::string> problems_;
 };
 
 PropertyPrior read_prior(Walker& walker, const YAML::Node& name, const YAML::Node& node, const std::string& what) {
@@ -121,7 +105,7 @@ PropertyTable parse_properties(const std::string& text, const std::string& where
   }
   Walker walker(where);
   std::vector<Property> properties;
-  std::vector<std::string>& problems = walker.problems();
+  std::vector<std::string>& problems = walker.problems;
   walker.mapping(document, "properties", [&](const std::string& name, const YAML::Node& at, const YAML::Node& node) {
     const size_t before = problems.size();
     Property property = read_property(walker, name, node);
@@ -130,7 +114,7 @@ PropertyTable parse_properties(const std::string& text, const std::string& where
       try {
         PropertyTable{{property}};
       } catch (const ConfigError& e) {
-        problems.push_back(walker.at(at) + ": " + e.what());
+        problems.push_back(walker.place(at) + ": " + e.what());
       }
     }
     properties.push_back(std::move(property));

@@ -23,12 +23,12 @@ bool recognises(const fs::path& path) { return fs::exists(path / "sequence.yaml"
 /// Reads `sequence.yaml`, gathering every problem.
 class Settings : public YamlProblems {
 public:
-  Settings(const YAML::Node& root, const fs::path& file) : YamlProblems(file), root_(root) {}
+  Settings(const YAML::Node& root, const fs::path& file) : YamlProblems(file.string()), root_(root) {}
 
   std::string text(const char* key, const std::string& otherwise) {
     const YAML::Node node = root_[key];
     if (!node) return otherwise;
-    if (!node.IsScalar()) problem(node, key, "a text", "something else");
+    if (!node.IsScalar()) problem(node, key, "a text");
     return node.IsScalar() ? node.Scalar() : otherwise;
   }
   double positive(const YAML::Node& parent, const char* key, std::optional<double> otherwise) {
@@ -36,8 +36,7 @@ public:
     if (!node && otherwise) return *otherwise;
     const auto number = node && node.IsScalar() ? parse_number(node.Scalar()) : std::nullopt;
     if (number && std::isfinite(*number) && *number > 0) return *number;
-    problem(node ? node : parent, key, "a number above 0",
-            node && node.IsScalar() ? "'" + node.Scalar() + "'" : "nothing");
+    problem(node, key, "a number above 0");
     return 1;
   }
   /// A list of one of these lengths; empty where the key is absent or wrong.
@@ -51,8 +50,7 @@ public:
         list.push_back(*number);
     if (node.IsSequence() && list.size() == node.size() && lengths.contains(list.size())) return list;
     problem(node, key,
-            "a list of " + std::to_string(*lengths.begin()) + " or " + std::to_string(*lengths.rbegin()) + " numbers",
-            "something else");
+            "a list of " + std::to_string(*lengths.begin()) + " or " + std::to_string(*lengths.rbegin()) + " numbers");
     return {};
   }
 
@@ -101,7 +99,7 @@ void read_settings(const fs::path& file, SequenceListing& listing, std::map<std:
   listing.depth_scale_stated = bool(root["depth_scale"]);
   if (const YAML::Node flag = root["depth_is_ray_length"];
       flag && !YAML::convert<bool>::decode(flag, listing.depth_is_ray_length))
-    settings.problem(flag, "depth_is_ray_length", "true or false", "something else");
+    settings.problem(flag, "depth_is_ray_length", "true or false");
   try {
     listing.pose_convention = parse_pose_convention(settings.text("pose_convention", "camera-to-world"), file.string());
     listing.depth_encoding = parse_depth_encoding(settings.text("depth_encoding", "plain"), file.string());

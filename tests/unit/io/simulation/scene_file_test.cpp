@@ -56,6 +56,9 @@ TEST_CASE("every fault of a scene file is reported with its line") {
   CHECK_THAT(with("shape: box", "shape: torus"),
              Contains("s.yaml:3: shape") && Contains("sphere") && Contains("'torus'"));
   CHECK_THAT(with("shape: box", "name: \"a\\N\", shape: box"), Contains("s.yaml:3: name") && Contains("UTF-8"));
+  CHECK_THAT(with("shape: box", "shape: box, shape: sphere"),
+             Contains("s.yaml:3: key: expected each once, found 'shape'"));
+  CHECK_THAT(with("half_size_m: [1, 1, 1], ", ""), Contains("s.yaml:3: half_size_m") && Contains("found nothing"));
   CHECK_THAT(with("material: wood", "material: jelly"), Contains("s.yaml:3: material"));
   CHECK_THAT(with("half_size_m: [1, 1, 1]", "half_size_m: [1, -1, 1]"), Contains("half_size_m"));
   CHECK_THAT(with("position_m: [0, 0, 0]", "position_m: [0, .nan, 0]"), Contains("position_m") && Contains("'.nan'"));
