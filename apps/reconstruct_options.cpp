@@ -90,7 +90,8 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
       ->option_text("N");
   command.add_flag("--resume", a.resume,
                    "Go on with the map in --out, however its run ended; the result is that of a run that never ended");
-  command.add_option("--config", a.config, "YAML file with any of these settings; the command line wins")
+  command
+      .add_option("--config", a.config, "YAML file with settings of sequence, map and labels; the command line wins")
       ->option_text("FILE");
 
   const char* map = "Map";
@@ -140,6 +141,11 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   configured.frames = file.frames.value_or(configured.frames);
   configured.depth_scale = file.depth_scale;
   configured.depth_is_ray_length = file.ray_length;
+  configured.distortion = file.distortion;
+  configured.T_body_camera = file.T_body_camera;
+  configured.pose_stamp_offset = file.stamp_offset.value_or(0);
+  configured.label_offset = file.label_offset.value_or(0);
+  configured.bgr = file.bgr.value_or(false);
   configured.max_dt_s = file.max_dt_s.value_or(configured.max_dt_s);
   configured.read_color = file.color.value_or(true);
   problems.attempt([&] {

@@ -112,7 +112,7 @@ std::vector<PairScore> cross_project(const std::vector<SampledFrame>& frames, co
   std::vector<std::optional<Eigen::Isometry3d>> poses(frames.size());
   for (size_t i = 0; i < frames.size(); ++i)
     if (const auto recorded = recorded_at(trajectory, frames[i], reading.pose_delay))
-      poses[i] = camera_pose(*recorded, reading.convention);
+      poses[i] = camera_pose(*recorded, reading.convention, trajectory.T_body_camera);
   std::vector<PairScore> scores(pairs.size());
   tbb::parallel_for(size_t(0), pairs.size(), [&](size_t i) {
     const auto [a, b] = pairs[i];

@@ -39,8 +39,9 @@ struct SampledFrame {
 struct RecordedTrajectory {
   std::vector<int64_t> position, index;
   std::vector<double> stamp;
-  std::vector<Eigen::Isometry3d> recorded;  ///< before any convention
-  double spacing = 0;                       ///< median difference of stamps
+  std::vector<Eigen::Isometry3d> recorded;                          ///< before any convention
+  Eigen::Isometry3d T_body_camera = Eigen::Isometry3d::Identity();  ///< where they are those of a body
+  double spacing = 0;                                               ///< median difference of stamps
 };
 
 struct Pair {

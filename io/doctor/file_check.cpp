@@ -119,7 +119,8 @@ Finding check_missing(const SequenceListing& listing) {
     finding.belief = "frames cannot be used for the reasons counted";
   }
   if (partnerless && listing.stamped)
-    finding.remedy = "--max-dt with a larger difference, or --color-offset where the clocks differ";
+    finding.remedy =
+        "--max-dt with a larger difference where colour lies farther from depth; --no-color where there is less of it";
   else if (finding.faulty)
     finding.remedy =
         "nothing needs to be done: these frames are skipped and counted; copy the recording again if they should be "

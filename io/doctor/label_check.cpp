@@ -70,7 +70,8 @@ std::map<int, Counts> count_labels(const GeometrySample& sample, const Reading& 
     const auto& positions = sample.trajectory.position;
     const auto at = std::lower_bound(positions.begin(), positions.end(), frame.position);
     if (frame.labels.empty() || at == positions.end() || *at != frame.position) continue;
-    poses.push_back(camera_pose(sample.trajectory.recorded[size_t(at - positions.begin())], reading.convention));
+    poses.push_back(camera_pose(sample.trajectory.recorded[size_t(at - positions.begin())], reading.convention,
+                                sample.trajectory.T_body_camera));
     frames.push_back(&frame);
   }
   const Eigen::Vector3d up = frames.empty() ? Eigen::Vector3d::UnitZ() : mean_up(poses);

@@ -147,6 +147,7 @@ Sample take_sample(const std::filesystem::path& path, const SequenceOptions& opt
     std::iota(posed.begin(), posed.end(), int64_t(0));
   }
   geometry.trajectory = recorded_trajectory(listing.frames, posed);
+  geometry.trajectory.T_body_camera = listing.T_body_camera;
 
   std::vector<std::optional<SampledFrame>> frames(positions.size());
   std::vector<std::string> reasons(positions.size());

@@ -127,8 +127,18 @@ ColorImage jpeg_decode(std::span<const uint8_t> file, const ImageHeader& header,
     const std::string message = tjGetErrorStr2(handle.get());
     // libjpeg fills what is missing with grey and only warns; a view with a grey lower half is no view.
     if (message.find("remature end") != std::string::npos) throw truncated(where, file);
+    // Bytes between two markers belong to neither; the picture is whole.
+    if (tjGetErrorCode(handle.get()) == TJERR_WARNING && message.find("extraneous bytes") != std::string::npos)
+      return image;
     throw ImageError("unreadable", where + ": JPEG: " + message);
   }
+  return image;
+}
+
+/// Alpha says whether there is colour, 0 or 255. Some renderers leave it 0 everywhere: then it says nothing.
+ColorImage with_plain_alpha(ColorImage image) {
+  const bool says_nothing = std::all_of(image.begin(), image.end(), [](Rgba8 pixel) { return pixel.a == 0; });
+  for (Rgba8& pixel : image) pixel.a = says_nothing || pixel.a != 0 ? 255 : 0;
   return image;
 }
 
@@ -221,17 +231,16 @@ ColorImage decode_color(std::span<const uint8_t> file, const std::string& where)
   if (header.bits != 8 || header.channels < 3 || !has_plain_rows(file)) {
     const std::vector<uint8_t> raw = spng_decode(file, SPNG_FMT_RGBA8, where);
     std::memcpy(static_cast<void*>(image.data()), raw.data(), raw.size());
-    for (Rgba8& pixel : image) pixel.a = 255;
-    return image;
+    return with_plain_alpha(std::move(image));
   }
   thread_local std::vector<uint8_t> buffer;
   const PngRows rows = decode_png_rows(file, header.height, row_bytes(header), header.channels, buffer, where);
   for (int v = 0; v < header.height; ++v) {
     const uint8_t* stored = rows.data + size_t(v) * rows.stride;
     for (int u = 0; u < header.width; ++u, stored += header.channels)
-      image.row(v)[u] = {stored[0], stored[1], stored[2], 255};
+      image.row(v)[u] = {stored[0], stored[1], stored[2], header.channels == 4 ? stored[3] : uint8_t(255)};
   }
-  return image;
+  return header.channels == 4 ? with_plain_alpha(std::move(image)) : image;
 }
 
 }  // namespace felt

@@ -70,10 +70,14 @@ std::vector<uint8_t> encode_png(const Image<uint8_t>& image) {
 }
 
 std::vector<uint8_t> encode_png(const ColorImage& image) {
+  const bool whole = std::all_of(image.begin(), image.end(), [](Rgba8 c) { return c.a != 0; });
   std::vector<uint8_t> rows;
-  rows.reserve(image.size() * 3);
-  for (const Rgba8& c : image) rows.insert(rows.end(), {c.r, c.g, c.b});
-  return png_of_rows(rows, image.width(), image.height(), 8, 2, 3);
+  rows.reserve(image.size() * 4);
+  for (const Rgba8& c : image) {
+    rows.insert(rows.end(), {c.r, c.g, c.b});
+    if (!whole) rows.push_back(c.a);
+  }
+  return png_of_rows(rows, image.width(), image.height(), 8, whole ? 2 : 6, whole ? 3 : 4);
 }
 
 std::vector<uint8_t> encode_jpeg(const ColorImage& image, int quality) {

@@ -8,7 +8,7 @@
 
 namespace felt {
 
-/// PNG bytes of an image: one channel of 16 or 8 bits, or RGB (alpha is not written).
+/// PNG bytes of an image: one channel of 16 or 8 bits, or RGB, with alpha where some pixel has no colour (a = 0).
 std::vector<uint8_t> encode_png(const Image<uint16_t>& image);
 std::vector<uint8_t> encode_png(const Image<uint8_t>& image);
 std::vector<uint8_t> encode_png(const ColorImage& image);

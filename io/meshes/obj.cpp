@@ -1,10 +1,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <optional>
+#include <limits>
 
 #include "core/error.h"
 #include "io/files/atomic_file.h"
+#include "io/files/text_input.h"
 #include "io/meshes/mesh_io.h"
 
 namespace felt {
@@ -18,15 +19,6 @@ std::string_view next_word(std::string_view& line) {
   const std::string_view word = line.substr(start, end - start);
   line.remove_prefix(end);
   return word;
-}
-
-template <typename T>
-std::optional<T> number(std::string_view word) {
-  if (!word.empty() && word.front() == '+') word.remove_prefix(1);
-  T value;
-  const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || stop != word.data() + word.size()) return std::nullopt;
-  return value;
 }
 
 void append(std::string& text, float value) {
@@ -62,9 +54,9 @@ TriangleMesh parse_obj(std::string_view bytes, const std::string& where) {
       float values[6];
       int n = 0;
       for (std::string_view word = next_word(line); !word.empty() && n < 6; word = next_word(line), ++n) {
-        const auto value = number<float>(word);
-        if (!value) fail("vertex", "a number", word);
-        values[n] = *value;
+        const auto value = parse_number(word);
+        if (!value || !(std::abs(*value) <= std::numeric_limits<float>::max())) fail("vertex", "a number", word);
+        values[n] = float(*value);
       }
       if (n < 3) fail("vertex", "three numbers", whole);
       mesh.positions.emplace_back(values[0], values[1], values[2]);
@@ -76,7 +68,7 @@ TriangleMesh parse_obj(std::string_view bytes, const std::string& where) {
     } else if (keyword == "f") {
       polygon.clear();
       for (std::string_view word = next_word(line); !word.empty(); word = next_word(line)) {
-        const auto index = number<int64_t>(word.substr(0, word.find('/')));
+        const auto index = parse_integer(word.substr(0, word.find('/')));
         if (!index) fail("face", "vertex numbers", word);
         const auto count = int64_t(mesh.positions.size());
         const int64_t at = *index < 0 ? count + *index : *index - 1;

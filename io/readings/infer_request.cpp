@@ -1,5 +1,6 @@
 #include "io/readings/infer_request.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -58,7 +59,24 @@ std::string quote_unreadable_tokens(std::string_view line) {
   return out;
 }
 
+/// How deep lists and objects lie within each other, at most. Copying and printing JSON takes stack for each level.
+int nesting(std::string_view line) {
+  int depth = 0, deepest = 0;
+  for (size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '"')
+      for (++i; i < line.size() && line[i] != '"'; ++i) i += line[i] == '\\' ? 1 : 0;
+    else if (line[i] == '[' || line[i] == '{')
+      deepest = std::max(deepest, ++depth);
+    else if (line[i] == ']' || line[i] == '}')
+      --depth;
+  }
+  return deepest;
+}
+
 json parse_object(std::string_view line) {
+  constexpr int kDeepest = 64;
+  if (const int depth = nesting(line); depth > kDeepest)
+    fail("line", "lists and objects at most " + std::to_string(kDeepest) + " deep", std::to_string(depth));
   json document = json::parse(line, nullptr, false);
   if (document.is_discarded()) {
     document = json::parse(quote_unreadable_tokens(line), nullptr, false);

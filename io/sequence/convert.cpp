@@ -66,6 +66,15 @@ std::string translation_quaternion_text(const Eigen::Isometry3d& T) {
   return text;
 }
 
+/// The sequence's own scale, or millimetres where it counts so coarsely that its depth was no whole numbers; coarser
+/// where the sensor sees farther than 16 bits of them.
+double own_scale(const SequenceInfo& info) {
+  if (info.depth_scale >= 100) return info.depth_scale;
+  double scale = 1000;
+  while (info.max_depth_m * scale > 65534) scale /= 2;
+  return scale;
+}
+
 /// Writes one sequence, frame by frame; the text files come at the end.
 class Writer {
 public:
@@ -77,7 +86,7 @@ public:
         jpeg_(options.jpeg_color) {
     depth_scale_ = options.depth_scale > 0 ? options.depth_scale
                    : names.depth_scale > 0 ? names.depth_scale
-                                           : info.depth_scale;
+                                           : own_scale(info);
   }
 
   void add(const Frame& frame, ConvertResult& result) {
@@ -89,6 +98,8 @@ public:
     lost(!frame.labels.empty(), names_.labels, "labels");
     lost(!frame.probabilities.empty(), names_.probabilities, "probabilities");
     lost(!frame.instances.empty(), names_.instances, "instances");
+    lost(jpeg_ && std::any_of(frame.color.begin(), frame.color.end(), [](Rgba8 c) { return c.a == 0; }), "",
+         "which pixels have no colour");
     lost(frame.stamp_s != double(frame.index), keeps_stamps() ? "stamps" : "", "stamps");
     const int64_t i = from_zero_ ? result.written : frame.index;
     put(named(names_.depth, i), encode_png(stored_depth(frame.depth_m, depth_scale_, result.depth_out_of_range)));

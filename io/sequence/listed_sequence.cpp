@@ -76,6 +76,8 @@ public:
 
 private:
   void find_camera(const fs::path& path);
+  /// Throws FormatError where the first colour image cannot be the stated camera's.
+  void check_color_camera(const fs::path& path) const;
   int probability_ranks() const;
   Eigen::Isometry3d read_pose(const FrameRecord& frame) const;
   DepthImage read_depth(const ImageSource& source) const;
@@ -91,6 +93,11 @@ private:
   Image<uint16_t> read_probability_planes(const ImageSource& source, float& scale) const;
   ProbabilityImage read_probabilities(const ImageSource& source, const LabelImage& labels) const;
   ProbabilityImage read_class_maps(const FrameRecord& frame) const;
+  /// A network's id by --label-offset; kNoLabel where it leaves 16 bits.
+  uint16_t moved(uint16_t id) const {
+    const int to = id + label_offset_;
+    return id != kNoLabel && to >= 0 && to < kNoLabel ? uint16_t(to) : kNoLabel;
+  }
   PinholeCamera camera_of_color_grid(int width, int height) const;
   bool on_depth_grid(int width, int height) const;
   /// Colour without a camera of its own comes through the depth camera's lens.
@@ -133,6 +140,7 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   label_offset_ = options.label_offset;
   with_color_ = options.read_color && any([](const FrameRecord& f) { return !f.color.empty(); });
   info_.has_color = with_color_;
+  if (with_color_ && listing_.color_intrinsics) check_color_camera(path);
   info_.has_labels = any([](const FrameRecord& f) { return !f.labels.empty(); });
   info_.has_probabilities = any([](const FrameRecord& f) { return !f.probabilities.empty() || !f.class_maps.empty(); });
   if (info_.has_probabilities) info_.probability_ranks = probability_ranks();
@@ -177,6 +185,25 @@ void ListedSequence::find_camera(const fs::path& path) {
   const Intrinsics k = listing_.intrinsics.value_or(Intrinsics{});
   info_.camera = {k.fx, k.fy, k.cx, k.cy, width, height};
   check_camera_fits_image(info_.camera, path.string());
+}
+
+void ListedSequence::check_color_camera(const fs::path& path) const {
+  for (const FrameRecord& frame : listing_.frames) {
+    if (frame.color.empty()) continue;
+    ImageHeader header;
+    try {
+      header = decoded(frame.color, "colour", read_image_header);
+    } catch (const Skip&) {
+      continue;  // that frame is skipped and counted when it is read
+    }
+    if (listing_.color_width > 0 && (header.width != listing_.color_width || header.height != listing_.color_height))
+      throw FormatError(describe_mismatch(
+          path.string(), "size of colour images",
+          size_text(listing_.color_width, listing_.color_height) + " as their camera says (--no-color does without)",
+          size_text(header.width, header.height) + " in the first one"));
+    return check_camera_fits_image(camera_of_color_grid(header.width, header.height),
+                                   path.string() + ": colour camera");
+  }
 }
 
 /// Of the first frame that has any; the others are made alike.
@@ -318,11 +345,8 @@ Image<uint16_t> ListedSequence::read_ids(const ImageSource& source, const std::s
 
 LabelImage ListedSequence::read_labels(const FrameRecord& frame, const DepthImage& depth_m) const {
   LabelImage labels = read_ids(frame.labels, "label", depth_m, &frame.color);
-  for (uint16_t& id : labels) {
-    if (label_offset_ == 0) break;
-    const int moved = id + label_offset_;
-    if (id != kNoLabel) id = moved >= 0 && moved < kNoLabel ? uint16_t(moved) : kNoLabel;
-  }
+  if (label_offset_ != 0)
+    for (uint16_t& id : labels) id = moved(id);
   return labels;
 }
 
@@ -388,7 +412,9 @@ ProbabilityImage ListedSequence::read_probabilities(const ImageSource& source, c
                                  std::to_string(width) + " x 2 m " + std::to_string(height) + " for the m best, or " +
                                      size_text(width, height) + " for the confidence of label images",
                                  size_text(stack.width(), stack.height()))};
-  return probabilities_of_stack(stack, height, scale);
+  ProbabilityImage image = probabilities_of_stack(stack, height, scale);
+  for (uint16_t& id : image.class_id) id = moved(id);
+  return image;
 }
 
 ProbabilityImage ListedSequence::read_class_maps(const FrameRecord& frame) const {
@@ -400,7 +426,8 @@ ProbabilityImage ListedSequence::read_class_maps(const FrameRecord& frame) const
       throw Skip{"wrong-size probability image",
                  describe_mismatch(map.image.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
                                    size_text(values.width(), values.height()))};
-    maps.push_back({map.class_id, std::move(values), map.score / scale});
+    const uint16_t id = map.from_network ? moved(map.class_id) : map.class_id;
+    if (id != kNoLabel) maps.push_back({id, std::move(values), map.score / scale});
   }
   return joined_class_maps(maps, listing_.classes.known(0));
 }

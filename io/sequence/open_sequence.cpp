@@ -56,7 +56,16 @@ const Layout& detect_layout(const fs::path& path) {
   throw FormatError(describe_mismatch(path.string(), "sequence", looked_for, "none of these but " + contents_of(path)));
 }
 
-SequenceListing list_as_recorded(const fs::path& path, const SequenceOptions& options) {
+/// The path without what hides its folder: a slash at its end, "." and "..".
+fs::path without_detours(const fs::path& path) {
+  fs::path clean = (path / "").lexically_normal().parent_path();
+  if (clean.empty() || clean.filename() == "." || clean.filename() == "..")
+    clean = (fs::absolute(path) / "").lexically_normal().parent_path();
+  return clean;
+}
+
+SequenceListing list_as_recorded(const fs::path& given, const SequenceOptions& options) {
+  const fs::path path = without_detours(given);
   std::error_code fault;
   if (!fs::exists(path, fault))
     throw IoError(describe_mismatch(path.string(), "sequence", "a folder or file", "nothing"));

@@ -35,7 +35,7 @@ std::optional<ClassMap> detection_of(const fs::path& file) {
   const auto id = parse_integer(words[words.size() - 2]);
   const auto score = parse_number(words.back());
   if (!id || *id < 0 || *id > 0xffff || !score || !(*score >= 0 && *score <= 1)) return std::nullopt;
-  return ClassMap{uint16_t(*id), {.path = file}, float(*score)};
+  return ClassMap{uint16_t(*id), {.path = file}, float(*score), true};
 }
 
 bool attach_detections(const std::vector<fs::path>& entries, SequenceListing& listing) {
@@ -67,7 +67,7 @@ bool attach_class_maps(const std::vector<fs::path>& entries, SequenceListing& li
     const auto frame = number ? frames.find(*number) : frames.end();
     const auto id = ids.find(std::string(words[1]));
     if (frame == frames.end() || id == ids.end()) continue;
-    frame->second->class_maps.push_back({id->second, {.path = entry}, 1});
+    frame->second->class_maps.push_back({id->second, {.path = entry}, 1, false});
     any = true;
   }
   return any;

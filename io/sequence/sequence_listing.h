@@ -28,6 +28,7 @@ struct ClassMap {
   uint16_t class_id = 0;
   ImageSource image;
   float score = 1;
+  bool from_network = false;  ///< `class_id` is a network's number, as label images hold: --label-offset moves it
 };
 
 /// One frame as the layout found it: names and a pose, nothing decoded.
@@ -50,6 +51,7 @@ struct SequenceListing {
   std::optional<Intrinsics> intrinsics;        ///< of the depth images
   int width = 0, height = 0;                   ///< of the depth images; 0: from the first one that can be read
   std::optional<Intrinsics> color_intrinsics;  ///< where colour is not on the depth images' grid
+  int color_width = 0, color_height = 0;       ///< of that camera's images; 0: not stated
   Distortion distortion, color_distortion;     ///< of each camera's lens
   Eigen::Matrix4d T_color_depth = Eigen::Matrix4d::Identity();
   double depth_scale = 1000;

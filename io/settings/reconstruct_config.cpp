@@ -13,6 +13,8 @@
 #include "core/error.h"
 #include "io/files/text_input.h"
 #include "io/files/yaml_problems.h"
+#include "io/sequence/pose_list.h"
+#include "io/sequence/undistortion.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -38,6 +40,27 @@ ReadValue number_into(std::optional<double>& target, double least, bool or_equal
     if (!number || !std::isfinite(*number) || (or_equal ? *number < least : *number <= least))
       throw ConfigError(describe_mismatch(where, "value", expected, "'" + text + "'"));
     target = *number;
+  };
+}
+
+ReadValue finite_into(std::optional<double>& target) {
+  return [&target](const YAML::Node& value, const std::string& where) {
+    const std::string text = text_of(value, where, "a number");
+    const auto number = parse_number(text);
+    if (!number || !std::isfinite(*number))
+      throw ConfigError(describe_mismatch(where, "value", "a number", "'" + text + "'"));
+    target = number;
+  };
+}
+
+ReadValue whole_into(std::optional<int>& target, int least, int most) {
+  return [&target, least, most](const YAML::Node& value, const std::string& where) {
+    const std::string expected = "a whole number from " + std::to_string(least) + " to " + std::to_string(most);
+    const std::string text = text_of(value, where, expected);
+    const auto number = parse_integer(text);
+    if (!number || *number < least || *number > most)
+      throw ConfigError(describe_mismatch(where, "value", expected, "'" + text + "'"));
+    target = int(*number);
   };
 }
 
@@ -117,7 +140,19 @@ std::map<std::string, ReadValue> readers_of(ReconstructConfig& c, const fs::path
       {"depth_encoding", parsed_into(c.depth_encoding, parse_depth_encoding)},
       {"ray_length", flag_into(c.ray_length)},
       {"pose_convention", parsed_into(c.pose_convention, parse_pose_convention)},
+      {"distortion", parsed_into(c.distortion, parse_distortion)},
+      {"body_camera",
+       [&c](const YAML::Node& value, const std::string& where) {
+         try {
+           c.T_body_camera = parse_pose(text_of(value, where, "a pose"), where);
+         } catch (const FormatError& fault) {
+           throw ConfigError(fault.what());
+         }
+       }},
       {"max_dt", number_into(c.max_dt_s, 0, false)},
+      {"stamp_offset", finite_into(c.stamp_offset)},
+      {"label_offset", whole_into(c.label_offset, -65535, 65535)},
+      {"bgr", flag_into(c.bgr)},
       {"color", flag_into(c.color)},
       {"voxel_size", number_into(c.voxel_size_m, 0, false)},
       {"truncation",
@@ -149,14 +184,7 @@ std::map<std::string, ReadValue> readers_of(ReconstructConfig& c, const fs::path
                               const std::string& where) { read_names(c.label_settings.ignore_classes, value, where); }},
       {"instances", flag_into(c.label_settings.instances)},
       {"spread_rest", flag_into(c.label_settings.spread_rest)},
-      {"threads",
-       [&c](const YAML::Node& value, const std::string& where) {
-         const std::string text = text_of(value, where, "a whole number from 1 to 1024");
-         const auto number = parse_integer(text);
-         if (!number || *number < 1 || *number > 1024)
-           throw ConfigError(describe_mismatch(where, "value", "a whole number from 1 to 1024", "'" + text + "'"));
-         c.threads = int(*number);
-       }},
+      {"threads", whole_into(c.threads, 1, 1024)},
   };
 }
 

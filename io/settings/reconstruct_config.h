@@ -22,7 +22,11 @@ struct ReconstructConfig {
   std::optional<DepthEncoding> depth_encoding;
   std::optional<bool> ray_length;
   std::optional<PoseConvention> pose_convention;
-  std::optional<double> max_dt_s;
+  std::optional<Distortion> distortion;
+  std::optional<Eigen::Isometry3d> T_body_camera;
+  std::optional<double> max_dt_s, stamp_offset;
+  std::optional<int> label_offset;
+  std::optional<bool> bgr;
   std::optional<bool> color;
   std::optional<double> voxel_size_m;
   std::optional<std::string> truncation;  ///< "0.08" (metres) or "4vox"

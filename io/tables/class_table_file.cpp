@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
 #include "core/error.h"
@@ -97,13 +98,27 @@ void read_yaml_class(const YAML::Node& row, const fs::path& path, Table& table) 
   if (id && !info.name.empty()) table.classes.push_back(info);
 }
 
+/// YAML keeps the first of two equal keys: which one was meant nobody knows.
+void refuse_repeated(const YAML::Node& node, const fs::path& path, Table& table) {
+  if (!node.IsMap()) return;
+  std::set<std::string> seen;
+  for (const auto& entry : node)
+    if (entry.first.IsScalar() && !seen.insert(entry.first.Scalar()).second)
+      table.problems.push_back(describe_mismatch(path.string() + ":" + std::to_string(entry.first.Mark().line + 1),
+                                                 "key", "each once", "'" + entry.first.Scalar() + "' again"));
+}
+
 Table read_yaml(const fs::path& path, const std::string& content) {
   Table table;
   try {
     const YAML::Node root = YAML::Load(content);
     if (!root.IsMap() || !root["classes"] || !root["classes"].IsSequence())
       throw ConfigError(describe_mismatch(path.string(), "classes", "a list under the key 'classes'", "none"));
-    for (const YAML::Node& row : root["classes"]) read_yaml_class(row, path, table);
+    refuse_repeated(root, path, table);
+    for (const YAML::Node& row : root["classes"]) {
+      refuse_repeated(row, path, table);
+      read_yaml_class(row, path, table);
+    }
   } catch (const YAML::Exception& fault) {
     throw ConfigError(path.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
   }

@@ -20,7 +20,11 @@ public:
 
   void number(const YAML::Node& node, const std::string& what, double& value) {
     double read;
-    if (node.IsScalar() && YAML::convert<double>::decode(node, read) && !std::isnan(read))
+    // "inf" is no number to YAML, which writes ".inf", and what everybody writes.
+    const auto plain = node.IsScalar() ? parse_number(node.Scalar()) : std::nullopt;
+    if (plain && !std::isnan(*plain))
+      value = *plain;
+    else if (node.IsScalar() && YAML::convert<double>::decode(node, read) && !std::isnan(read))
       value = read;
     else
       problem(node, what, "a number");

@@ -1,5 +1,8 @@
 #include "io/sequence/layouts/file_names.h"
 
+#include <algorithm>
+#include <cctype>
+
 #include "core/error.h"
 #include "io/files/text_input.h"
 
@@ -10,8 +13,10 @@ namespace {
 std::optional<int64_t> number_between(const std::string& name, const std::string& prefix,
                                       const std::vector<std::string>& suffixes) {
   if (!name.starts_with(prefix)) return std::nullopt;
+  std::string lower = name;
+  std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return char(std::tolower(c)); });
   for (const std::string& suffix : suffixes) {
-    if (!name.ends_with(suffix) || name.size() <= prefix.size() + suffix.size()) continue;
+    if (!lower.ends_with(suffix) || name.size() <= prefix.size() + suffix.size()) continue;
     const auto number =
         parse_integer(std::string_view(name).substr(prefix.size(), name.size() - prefix.size() - suffix.size()));
     if (number && *number >= 0) return number;

@@ -30,7 +30,10 @@ SequenceListing list_frames(const fs::path& path) {
   listing.frames = frame_records({.depth = depth_files(path / "depth"),
                                   .color = numbered_files(path / "color", "", {".jpg", ".png", ".jpeg"}),
                                   .pose = numbered_files(path / "pose", "", {".txt"})});
-  if (const fs::path labels = first_existing(path, kLabelFolders); !labels.empty()) attach_labels(labels, listing);
+  if (const fs::path labels = first_existing(path, kLabelFolders); has_numbered_file(labels, "", {".png"}))
+    attach_labels(labels, listing);
+  else if (!labels.empty())
+    listing.notes.push_back(labels.string() + ": no PNG images named by frame number: not used as labels");
   if (const fs::path table = first_existing(path, kTables); !table.empty()) listing.classes = read_class_table(table);
   return listing;
 }
@@ -39,7 +42,11 @@ SequenceListing list_scannet(const fs::path& path, const SequenceOptions& option
   SequenceListing listing = list_frames(path);
   const fs::path depth_camera = first_existing(path, kDepthCamera), color_camera = first_existing(path, kColorCamera);
   if (!options.intrinsics && !depth_camera.empty()) listing.intrinsics = read_camera_file(depth_camera).intrinsics;
-  if (!color_camera.empty()) listing.color_intrinsics = read_camera_file(color_camera).intrinsics;
+  if (!color_camera.empty()) {
+    const CameraFile file = read_camera_file(color_camera);
+    listing.color_intrinsics = file.intrinsics;
+    listing.color_width = file.width, listing.color_height = file.height;
+  }
   return listing;
 }
 

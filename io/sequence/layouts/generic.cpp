@@ -89,9 +89,10 @@ void read_settings(const fs::path& file, SequenceListing& listing, std::map<std:
   else
     settings.problem(root, "camera", "{fx, fy, cx, cy, width, height}", "nothing");
   if (const YAML::Node camera = root["color_camera"]; camera && camera.IsMap()) {
-    int width = 0, height = 0;
-    listing.color_intrinsics = camera_of(camera, width, height);
+    listing.color_intrinsics = camera_of(camera, listing.color_width, listing.color_height);
     listing.color_distortion = distortion_of(camera);
+  } else if (camera) {
+    settings.problem(camera, "color_camera", "{fx, fy, cx, cy, width, height}");
   }
   listing.T_body_camera = rigid("T_body_camera");
   listing.T_color_depth = rigid("T_color_depth").matrix();
@@ -106,7 +107,9 @@ void read_settings(const fs::path& file, SequenceListing& listing, std::map<std:
   } catch (const ConfigError& fault) {
     settings.problems.push_back(fault.what());
   }
-  if (const YAML::Node given = root["paths"]; given && given.IsMap()) {
+  if (const YAML::Node given = root["paths"]; given && !given.IsMap()) {
+    settings.problem(given, "paths", "a folder or file for each kind of image");
+  } else if (given) {
     std::set<std::string> known;
     for (const auto& [key, value] : paths) known.insert(key);
     settings.refuse_unknown(given, known);

@@ -50,7 +50,36 @@ Eigen::Matrix4d sensor_to_camera(const fs::path& folder) {
   return Eigen::Matrix4d::Identity();
 }
 
-SequenceListing list(const fs::path& path, const SequenceOptions&) {
+/// Ranges of a scan have neither lens nor scale, and its faces turn with it: options about those would do nothing or
+/// harm.
+void refuse_camera_options(const SequenceOptions& options) {
+  const std::pair<bool, const char*> given[] = {{options.intrinsics.has_value(), "--intrinsics"},
+                                                {options.depth_scale.has_value(), "--depth-scale"},
+                                                {options.depth_encoding.has_value(), "--depth-encoding"},
+                                                {options.depth_is_ray_length.value_or(false), "--ray-length"},
+                                                {options.distortion.has_value(), "--distortion"},
+                                                {options.T_body_camera.has_value(), "--body-camera"},
+                                                {options.pose_convention.has_value(), "--pose-convention"},
+                                                {options.pose_stamp_offset != 0, "--stamp-offset"}};
+  for (const auto& [is_given, option] : given)
+    if (is_given)
+      throw ConfigError(describe_mismatch(option, "sequence", "images of a camera", "scans of a turning range sensor"));
+}
+
+/// Line of poses.txt of each scan: the number in its name where all are in the file, as where only some scans of a
+/// recording are there, else its position.
+std::vector<size_t> pose_lines(const std::vector<fs::path>& scans, size_t poses) {
+  std::vector<size_t> by_number, by_position;
+  for (const fs::path& scan : scans) {
+    const auto number = trailing_number(scan.stem().string());
+    if (number && *number >= 0 && size_t(*number) < poses) by_number.push_back(size_t(*number));
+    by_position.push_back(by_position.size());
+  }
+  return by_number.size() == scans.size() ? by_number : by_position;
+}
+
+SequenceListing list(const fs::path& path, const SequenceOptions& options) {
+  refuse_camera_options(options);
   SequenceListing listing;
   const std::vector<fs::path> scans = scans_of(path);
   const fs::path folder = fs::is_regular_file(path) ? path.parent_path() : path;
@@ -67,13 +96,14 @@ SequenceListing list(const fs::path& path, const SequenceOptions&) {
                                               : "no poses.txt: only the first of " + std::to_string(scans.size()) +
                                                     " scans is used, the sensor is the origin, z up");
   }
+  const std::vector<size_t> lines = file.empty() ? pose_lines(scans, 0) : pose_lines(scans, poses.size());
   for (size_t i = 0; i < scans.size(); ++i)
     for (int face = 0; face < kScanFaces; ++face) {
       FrameRecord frame;
       frame.index = int64_t(i) * kScanFaces + face;
       frame.stamp_s = double(frame.index);
       frame.depth = {scans[i], 0, 0, ImageSource::Codec::scan, face};
-      if (i < poses.size()) frame.pose = poses[i].matrix * T_scan_face(face).matrix();
+      if (lines[i] < poses.size()) frame.pose = poses[lines[i]].matrix * T_scan_face(face).matrix();
       listing.frames.push_back(std::move(frame));
     }
   const PinholeCamera camera = scan_face_camera();

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "core/error.h"
 #include "io/files/text_input.h"
 #include "io/sequence/camera_file.h"
@@ -56,14 +58,25 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   const fs::path color_folder = fs::exists(path / "color") ? path / "color" : path / "image";
   listing.frames = frame_records(
       {.depth = depth_files(path / "depth"), .color = numbered_files(color_folder, "", {".jpg", ".png"})});
-  // Colour alone is no frame: the log counts depth images from 0, whatever the first one's number is.
+  // The log counts from 0, whatever number the first image has: by numbers, so that a missing image shifts no pose, and
+  // by position where numbers have gaps that the log does not know. Colour alone is no frame.
+  const int64_t first = listing.frames.empty() ? 0 : listing.frames.front().index;
   std::erase_if(listing.frames, [](const FrameRecord& frame) { return frame.depth.empty(); });
-  for (size_t i = 0; i < listing.frames.size(); ++i)
-    if (const auto found = pose_at.find(int64_t(i)); found != pose_at.end()) listing.frames[i].pose = found->second;
+  const bool by_number = std::all_of(listing.frames.begin(), listing.frames.end(),
+                                     [&](const FrameRecord& frame) { return pose_at.contains(frame.index - first); });
+  for (size_t i = 0; i < listing.frames.size(); ++i) {
+    const auto found = pose_at.find(by_number ? listing.frames[i].index - first : int64_t(i));
+    if (found != pose_at.end()) listing.frames[i].pose = found->second;
+  }
+  if (!by_number && pose_at.size() != listing.frames.size())
+    listing.notes.push_back(std::to_string(listing.frames.size()) + " depth images and " +
+                            std::to_string(pose_at.size()) + " poses in " + log.filename().string() +
+                            ": they are taken to go together in order, from the first on");
   if (const fs::path camera = first_existing(path, kCameras); !camera.empty()) {
     const CameraFile file = read_camera_file(camera);
     if (!options.intrinsics) listing.intrinsics = file.intrinsics;
     listing.width = file.width, listing.height = file.height;
+    if (file.depth_scale > 0) listing.depth_scale = file.depth_scale;
   } else if (!options.intrinsics) {
     listing.intrinsics = Intrinsics{525, 525, 319.5, 239.5};
     listing.notes.push_back("no intrinsic.json: Open3D's default camera (525, 525, 319.5, 239.5) is assumed");

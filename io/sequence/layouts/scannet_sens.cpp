@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <fstream>
@@ -107,7 +108,8 @@ SequenceListing list(const fs::path& file_or_folder, const SequenceOptions& opti
   listing.depth_scale = double(depth_shift);
   if (!options.intrinsics) listing.intrinsics = intrinsics_of(depth_camera, path.string());
   if (color_width != depth_width || color_height != depth_height || color_camera != depth_camera)
-    listing.color_intrinsics = intrinsics_of(color_camera, path.string());
+    listing.color_intrinsics = intrinsics_of(color_camera, path.string()), listing.color_width = int(color_width),
+    listing.color_height = int(color_height);
   if (color_pose != depth_pose) listing.T_color_depth = color_pose.inverse() * depth_pose;
 
   const auto codec = depth_codec == kDepthZlib ? ImageSource::Codec::zlib_u16 : ImageSource::Codec::raw_u16;
@@ -136,6 +138,13 @@ SequenceListing list(const fs::path& file_or_folder, const SequenceOptions& opti
     }
     file.skip(color_bytes + depth_bytes, "images");
   }
+  // Many containers hold zeros or repeated moments: frame numbers then.
+  std::vector<FrameRecord>& frames = listing.frames;
+  listing.stamped = std::adjacent_find(frames.begin(), frames.end(), [](const FrameRecord& a, const FrameRecord& b) {
+                      return !(a.stamp_s < b.stamp_s);
+                    }) == frames.end();
+  if (!listing.stamped)
+    for (FrameRecord& frame : frames) frame.stamp_s = double(frame.index);
   return listing;
 }
 

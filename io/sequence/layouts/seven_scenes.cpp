@@ -52,6 +52,10 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
       listing.notes.push_back("no camera-intrinsics.txt: the depth camera of 7-Scenes (585, 585, 320, 240) is assumed");
     }
   }
+  // Microsoft's recordings: depth is not registered to colour, whose camera has another focal length. How the cameras
+  // lie to each other was not published; a few pixels are left.
+  if (const auto& k = listing.intrinsics; k && k->fx == 585 && k->fy == 585 && k->cx == 320 && k->cy == 240)
+    listing.color_intrinsics = Intrinsics{525, 525, 320, 240};
   for (const fs::path& place : {folder, above})
     if (const fs::path table = first_existing(place, {"classes.yaml"}); !table.empty() && listing.classes.empty())
       listing.classes = read_class_table(table);

@@ -91,14 +91,18 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
     if (its_depth >= 0 && ascending_depth_stamps[size_t(its_depth)] == frame.stamp_s)
       frame.color.path = color[size_t(partner)].path;
     else if (options.read_color && !color.empty())
-      refuse("missing colour image", "no colour image" + within);
+      refuse("missing colour image",
+             partner < 0 ? "no colour image" + within : "the nearest colour image belongs to another depth image");
     listing.frames.push_back(std::move(frame));
   }
   if (!options.intrinsics) {
     const fs::path camera =
         first_existing(path, {"camera-intrinsics.txt", "intrinsics.txt", "camera.yaml", "calibration.txt"});
     if (!camera.empty()) {
-      listing.intrinsics = read_camera_file(camera).intrinsics;
+      const CameraFile file = read_camera_file(camera);
+      listing.intrinsics = file.intrinsics;
+      listing.width = file.width, listing.height = file.height;
+      if (file.depth_scale > 0) listing.depth_scale = file.depth_scale;
     } else {
       listing.intrinsics = Intrinsics{525, 525, 319.5, 239.5};
       listing.notes.push_back(

@@ -60,6 +60,16 @@ TEST_CASE("a class whose entries are null takes no part and stays null") {
   CHECK(answer["responsibility"][0].get<double>() + answer["responsibility"][2].get<double>() == Approx(1));
 }
 
+TEST_CASE("a line nested without end is an unusable line, not the end of the program") {
+  const std::string many(200000, '['), closed(200000, ']');
+  for (const std::string& line : {many + closed, "{\"psi\": 1, \"prior\": " + many + closed + "}", many}) {
+    const json answer = ask(line);
+    CHECK_THAT(answer.at("error").get<std::string>(), Catch::Contains("deep"));
+    CHECK(answer.at("line") == 7);
+  }
+  CHECK_FALSE(ask(good_with("/comment", "[[[\\\"[").dump()).contains("error"));
+}
+
 TEST_CASE("an unusable line is answered with its number and the field at fault") {
   struct Case {
     std::string line, field;

@@ -35,6 +35,18 @@ TEST_CASE("the shipped friction table holds the published eight materials") {
   CHECK(p.rho == 0.5);
 }
 
+TEST_CASE("a support without an upper end is written as everybody writes it, or as YAML does") {
+  for (const char* end : {"inf", ".inf", "+inf"}) {
+    INFO(end);
+    const PropertyTable table = parse_properties("friction: {unit: \"1\", support: [0, " + std::string(end) +
+                                                     "], priors: {concrete: {mean: .543, sd: .065, readings: 1723}}}\n",
+                                                 "p.yaml");
+    CHECK(std::isinf(table[0].support_hi));
+    CHECK(table[0].priors.at("concrete").mean == 0.543);
+  }
+  CHECK_THROWS_AS(parse_properties("friction: {support: [0, nan]}\n", "p.yaml"), ConfigError);
+}
+
 TEST_CASE("every problem of a property file is named at once with its line") {
   const std::string text =
       "friction:\n"

@@ -16,7 +16,8 @@ TEST_CASE("a configuration sets what it names and leaves the rest open") {
   write_text(
       file,
       "voxel_size: 0.01\ntruncation: 4vox\nmax-depth: 3.5\nframes: 0:100:2\nintrinsics: [525, 525, 319.5, 239.5]\n"
-      "weight: sensor-noise\ncarve: true\nthreads: 2\nclasses: classes.yaml\npose_convention: w2c,opengl\n");
+      "weight: sensor-noise\ncarve: true\nthreads: 2\nclasses: classes.yaml\npose_convention: w2c,opengl\n"
+      "bgr: true\nlabel_offset: -1\nstamp-offset: -0.02\ndistortion: 0.1,0.01,0,0\nbody_camera: 1 2 3 0 0 0 1\n");
   const ReconstructConfig config = read_reconstruct_config(file);
   CHECK(config.voxel_size_m == 0.01);
   CHECK(parse_truncation(*config.truncation, *config.voxel_size_m, "truncation") == Approx(0.04));
@@ -28,6 +29,13 @@ TEST_CASE("a configuration sets what it names and leaves the rest open") {
   CHECK(config.threads == 2);
   CHECK(config.classes == folder.path() / "classes.yaml");
   CHECK(config.pose_convention == PoseConvention{true, true});
+  CHECK(config.bgr == true);
+  CHECK(config.label_offset == -1);
+  CHECK(config.stamp_offset == -0.02);
+  REQUIRE(config.distortion);
+  CHECK(config.distortion->k1 == 0.1);
+  REQUIRE(config.T_body_camera);
+  CHECK(config.T_body_camera->translation().z() == 3);
   CHECK(!config.min_depth_m);
   CHECK(!config.distance);
   CHECK(!config.depth_scale);
