@@ -116,6 +116,8 @@ std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vec
   return save_map(map, path, {.views = complete || !record.stopped.empty()});
 }
 
+void forget_progress(Map& map) { map.metadata.erase(kProgress); }
+
 std::optional<Checkpoint> resume(const std::filesystem::path& path, const std::string& recording,
                                  const nlohmann::ordered_json& config) {
   if (!std::filesystem::exists(path)) return std::nullopt;

@@ -28,6 +28,9 @@ std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vec
                             bool complete, const std::string& touches, const std::string& recording,
                             const nlohmann::ordered_json& config, const std::filesystem::path& path);
 
+/// Of a part of a map: no run can go on with it.
+void forget_progress(Map& map);
+
 /// Where an earlier run ended.
 struct Checkpoint {
   Map map;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/checkpoint.h"
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
@@ -79,7 +80,8 @@ json write_vdb(const Map& map, const Region* part, const ExportOptions& o) {
   json written = {{"path", o.vdb.string()}};
   if (o.grids.empty() && !o.half) {
     const Map& whole = map;
-    const Map some = part == nullptr ? Map(map.voxel_size_m, map.truncation_m) : cropped(map, *part);
+    Map some = part == nullptr ? Map(map.voxel_size_m, map.truncation_m) : cropped(map, *part);
+    forget_progress(some);
     const Map& saved = part == nullptr ? whole : some;
     save_map(saved, o.vdb, o.compact ? SaveOptions{MapCompression::zip, false} : SaveOptions{});
     written["active_voxels"] = active_voxel_count(saved);

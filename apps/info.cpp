@@ -135,7 +135,8 @@ int run(const fs::path& path, const ReadingArguments& reading, bool with_grids, 
         const CommonOptions& common) {
   if (!fs::exists(path))
     throw IoError(describe_mismatch(path.string(), "what to describe", "a map file or a sequence", "nothing there"));
-  const bool is_map = fs::is_regular_file(path) && path.extension() == ".vdb";
+  // Sequences are folders, but for containers and single scans.
+  const bool is_map = fs::is_regular_file(path) && path.extension() != ".sens" && path.extension() != ".bin";
   if (is_map && !pictures.empty())
     throw ConfigError(describe_mismatch("--pictures", "what to describe", "a sequence", path.string()));
   const SequenceOptions options = resolve(reading);

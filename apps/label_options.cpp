@@ -2,22 +2,14 @@
 
 #include <nlohmann/json.hpp>
 
+#include "apps/number_checks.h"
 #include "core/error.h"
+#include "io/files/content_hash.h"
+#include "io/files/text_input.h"
 #include "io/tables/confusion_file.h"
 #include "mapping/labels/ignored_classes.h"
 
 namespace felt::apps {
-namespace {
-
-/// The double that a person would write for a float.
-double short_decimal(float value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%g", double(value));
-  return std::stod(text);
-}
-
-}  // namespace
-
 void add_label_options(CLI::App& command, LabelSettings& s) {
   const LabelConfig standard = standard_labels();
   const auto bracketed = [](float value) { return " [" + nlohmann::json(short_decimal(value)).dump() + "]"; };
@@ -95,7 +87,10 @@ void add_to_json(const LabelSettings& settings, const LabelConfig& config, nlohm
   json["label_turn_deg"] = short_decimal(config.novelty_deg);
   json["spread_rest"] = config.spread_dropped;
   if (settings.class_prior) json["class_prior"] = *settings.class_prior;
-  if (!settings.confusion.empty()) json["confusion"] = settings.confusion.string();
+  if (!settings.confusion.empty()) {
+    json["confusion"] = settings.confusion.string();
+    json["confusion_content"] = content_hash(read_whole_file(settings.confusion));
+  }
   if (!settings.ignore_classes.empty()) json["ignore_classes"] = settings.ignore_classes;
   json["instances"] = config.instances;
 }

@@ -49,14 +49,20 @@ void add_commands(CLI::App& app) {
   app.footer("Each command explains itself, with an example: feltmap <command> --help");
 }
 
+/// The code, or that of a failure where what was printed did not arrive.
+int written(int code) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  return fail(kInputOutput, "standard output: cannot be written");
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Dense volumetric mapping that knows what things are and how they feel", "feltmap");
   add_commands(app);
   try {
     app.parse(argc, argv);
-    return kDone;
+    return written(kDone);
   } catch (const CLI::RuntimeError& e) {
-    return e.get_exit_code();
+    return written(e.get_exit_code());
   } catch (const CLI::Success& e) {
     return app.exit(e);  // --help, --version
   } catch (const CLI::ParseError& e) {

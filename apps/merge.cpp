@@ -2,6 +2,8 @@
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
 #include <vector>
 
 #include "apps/command.h"
@@ -9,6 +11,7 @@
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
 #include "apps/output_files.h"
+#include "core/error.h"
 #include "io/map_file/map_file.h"
 #include "mapping/maps/merge.h"
 
@@ -20,8 +23,29 @@ struct Options {
   std::vector<std::string> maps;
   std::string out;
   MergeOptions merge;
+  std::optional<float> max_weight;
   bool overwrite = false;
 };
+
+/// With the cap that was given, else the one that all maps were made with, else the usual one.
+MergeOptions with_cap(const Options& options, const std::vector<Map>& maps) {
+  MergeOptions merge = options.merge;
+  std::set<float> caps;
+  for (const Map& map : maps)
+    for (const FusedFrames& run : map.frames.runs)
+      if (const auto settings = nlohmann::json::parse(run.settings, nullptr, false);
+          settings.is_object() && settings.contains("max_weight") && settings["max_weight"].is_number())
+        caps.insert(settings["max_weight"].get<float>());
+  if (options.max_weight) {
+    merge.max_weight = *options.max_weight;
+  } else if (caps.size() == 1) {
+    merge.max_weight = *caps.begin();
+  } else if (caps.size() > 1) {
+    throw ConfigError(describe_mismatch("merge", "cap of weights", "the same in all maps, or --max-weight",
+                                        std::to_string(*caps.begin()) + " and " + std::to_string(*caps.rbegin())));
+  }
+  return merge;
+}
 
 int run(const Options& options) {
   using Clock = std::chrono::steady_clock;
@@ -34,8 +58,9 @@ int run(const Options& options) {
   std::vector<const Map*> pointers;
   for (const std::string& path : options.maps) pointers.push_back(&maps.emplace_back(load_map(path)));
   const auto loaded = Clock::now();
-  const Map result = merge(pointers, options.merge);
-  require_nothing_lost(options.out, result, options.overwrite);
+  const Map result = merge(pointers, with_cap(options, maps));
+  const MapWriting writing(options.out);
+  require_nothing_lost(options.out, result, true, options.overwrite);
   const auto merged = Clock::now();
   const std::string hash = save_map(result, options.out);
   const auto saved = Clock::now();
@@ -71,9 +96,10 @@ void add_merge(CLI::App& app) {
                    "Replace a map although it holds frames or touches that these do not");
   command.add_flag("--allow-shared-frames", options->merge.allow_shared_frames,
                    "Merge although the journals share frames, which then count twice");
-  command.add_option("--max-weight", options->merge.max_weight, "Cap of the summed weight, as in reconstruct")
-      ->check(above_zero())
-      ->capture_default_str();
+  command
+      .add_option("--max-weight", options->max_weight,
+                  "Cap of the summed weight [what the maps were made with, else 255]")
+      ->check(above_zero());
 }
 
 }  // namespace felt::apps

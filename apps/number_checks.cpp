@@ -1,5 +1,6 @@
 #include "apps/number_checks.h"
 
+#include <charconv>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -31,6 +32,12 @@ CLI::Validator at_least_zero() {
 
 CLI::Validator finite() {
   return number_check("a finite number", "", [](double) { return true; });
+}
+
+double short_decimal(float value) {
+  char text[32];
+  const auto [end, fault] = std::to_chars(text, text + sizeof text, value);
+  return fault == std::errc() ? parse_number({text, size_t(end - text)}).value_or(double(value)) : double(value);
 }
 
 }  // namespace felt::apps

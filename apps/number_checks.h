@@ -9,4 +9,7 @@ CLI::Validator above_zero();
 CLI::Validator at_least_zero();
 CLI::Validator finite();
 
+/// The double that a person would write for a float, 0.1 and not 0.10000000149: the shortest one that is that float.
+double short_decimal(float value);
+
 }  // namespace felt::apps

@@ -15,14 +15,28 @@ namespace felt::apps {
 namespace fs = std::filesystem;
 namespace {
 
-/// What of the journals the map does not hold, in words; empty where there is nothing.
-std::string missing_from(const Map& map, const MapJournals& journals) {
-  std::set<uint64_t> touches;
-  for (const Touch& touch : map.touches.touches) touches.insert(touch.id);
-  const size_t lost_frames =
-      shared_frames(journals.frames, journals.frames).size() - shared_frames(journals.frames, map.frames).size();
-  const auto lost_touches = std::count_if(journals.touches.touches.begin(), journals.touches.touches.end(),
-                                          [&](const Touch& touch) { return !touches.contains(touch.id); });
+/// Frames of a run that the journal does not hold with the same settings.
+size_t frames_missing_from(const FrameJournal& journal, const FusedFrames& run) {
+  std::set<int64_t> missing(run.frames.begin(), run.frames.end());
+  for (const FusedFrames& other : journal.runs)
+    if (other.sequence == run.sequence && other.settings == run.settings)
+      for (const int64_t frame : other.frames) missing.erase(frame);
+  return missing.size();
+}
+
+/// What of an older map the new one does not hold, in words; empty where there is nothing.
+std::string missing_from(const Map& map, const MapJournals& older, bool touches_too) {
+  if (older.voxel_size_m != map.voxel_size_m) return "a map of " + std::to_string(older.voxel_size_m) + " m voxels";
+  if (!older.classes.empty() && !(older.classes == map.classes)) return "a map of other classes";
+  if (!older.properties.empty() && !(older.properties == map.properties)) return "a map of other properties";
+  if (older.frames.runs.empty() && !map.frames.runs.empty()) return "a map that does not say of what it was made";
+  size_t lost_frames = 0;
+  for (const FusedFrames& run : older.frames.runs) lost_frames += frames_missing_from(map.frames, run);
+  const auto lost_touches =
+      std::count_if(older.touches.touches.begin(), older.touches.touches.end(), [&](const Touch& touch) {
+        const Touch* kept = map.touches.find(touch.id);
+        return touches_too && !touch.undone && (kept == nullptr || kept->undone);
+      });
   if (lost_frames == 0 && lost_touches == 0) return "";
   return "a map with " + std::to_string(lost_frames) + " frames and " + std::to_string(lost_touches) +
          " touches that the new one does not hold";
@@ -39,13 +53,13 @@ void prepare_output_folder(const fs::path& folder, const std::vector<std::string
   if (access(folder.c_str(), W_OK | X_OK) != 0)
     throw IoError(
         describe_mismatch(folder.string(), "output folder", "a folder that can be written", std::strerror(errno)));
-  for (const std::string& name : names) remove_abandoned_parts(folder / name);
   std::string in_the_way;
   for (const std::string& name : names)
     if (fs::exists(folder / name)) in_the_way += (in_the_way.empty() ? "" : ", ") + name;
   if (!in_the_way.empty() && !overwrite)
     throw IoError(
         describe_mismatch(folder.string(), "output exists", "no result there, or --force to replace it", in_the_way));
+  for (const std::string& name : names) remove_abandoned_parts(folder / name);
 }
 
 void require_no_file(const fs::path& file, bool overwrite) {
@@ -53,16 +67,20 @@ void require_no_file(const fs::path& file, bool overwrite) {
     throw IoError(describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", "one"));
 }
 
-void require_nothing_lost(const fs::path& file, const Map& replacement, bool overwrite) {
+void require_nothing_lost(const fs::path& file, const Map& replacement, bool touches_too, bool overwrite) {
   if (overwrite || !fs::is_regular_file(file)) return;
   std::string lost;
   try {
-    lost = missing_from(replacement, load_journals(file));
+    lost = missing_from(replacement, load_journals(file), touches_too);
   } catch (const Error&) {
     lost = "a file that is no map that can be read";
   }
   if (!lost.empty())
     throw IoError(describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", lost));
 }
+
+MapWriting::MapWriting(const fs::path& file)
+    : folder_(file.has_parent_path() ? file.parent_path() : fs::path("."), FileLock::Kind::shared, 1),
+      file_(file, FileLock::Kind::exclusive, 60) {}
 
 }  // namespace felt::apps

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "io/files/file_lock.h"
 #include "mapping/map.h"
 
 namespace felt::apps {
@@ -16,8 +17,19 @@ void prepare_output_folder(const std::filesystem::path& folder, const std::vecto
 /// The same for one file: throws IoError where it exists unless `overwrite`.
 void require_no_file(const std::filesystem::path& file, bool overwrite);
 
-/// The same for a file that may be replaced by a map which holds all its frames and touches: throws IoError where it
-/// is no map, or one that holds more, unless `overwrite`.
-void require_nothing_lost(const std::filesystem::path& file, const Map& replacement, bool overwrite);
+/// The same for a file that may be replaced by a map with the same voxels and tables which holds all its frames, fused
+/// with the same settings, and (`touches_too`) its touches that count: throws IoError where it is no map, or one that
+/// holds more, unless `overwrite`.
+void require_nothing_lost(const std::filesystem::path& file, const Map& replacement, bool touches_too, bool overwrite);
+
+/// Keeps other commands from a map file, and runs of reconstruct from its folder, while it is replaced by what is made
+/// of it. Waits for other commands up to a minute. Throws IoError.
+class MapWriting {
+public:
+  explicit MapWriting(const std::filesystem::path& file);
+
+private:
+  FileLock folder_, file_;
+};
 
 }  // namespace felt::apps

@@ -4,6 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "io/files/content_hash.h"
+#include "io/files/text_input.h"
+
 namespace felt::apps {
 namespace {
 
@@ -48,7 +51,10 @@ Perception perception_of(const PerceptionArguments& arguments, const ClassTable&
 
 nlohmann::ordered_json to_json(const PerceptionArguments& arguments) {
   nlohmann::ordered_json json;
-  if (!arguments.net.empty()) json["segmenter"] = arguments.net.string();
+  if (!arguments.net.empty()) {
+    json["segmenter"] = arguments.net.string();
+    json["segmenter_content"] = content_hash(read_whole_file(arguments.net));
+  }
   json["top"] = arguments.top;
   for (const auto& [name, source] : kSources)
     if (source == arguments.vote) json["vote"] = name;

@@ -113,7 +113,7 @@ void fuse(const SequenceReader& sequence, const FrameSource& source, const Perce
                   if (interrupt.requested()) return "interrupted";
                   constexpr int64_t kMemoryCheckEvery = 32;
                   if (so_far.read % kMemoryCheckEvery == 0 && memory_runs_out(map)) return "out of memory";
-                  if (options.checkpoint_every > 0 && so_far.read % options.checkpoint_every == 0 &&
+                  if (options.checkpoint_every > 0 && so_far.fused > 0 && so_far.read % options.checkpoint_every == 0 &&
                       so_far.read < sequence.size())
                     try_checkpoint(save, so_far.read);
                   return {};
@@ -198,6 +198,17 @@ std::vector<Finding> likely_faults(const fs::path& sequence, const SequenceOptio
   return faults;
 }
 
+/// Evidence and touches speak of classes and properties by their place in the tables.
+void require_tables_of(const Map& map, const ClassTable& classes, const PropertyTable& properties,
+                       const std::string& where) {
+  std::vector<std::string> problems;
+  if (!(map.classes == classes))
+    problems.push_back(describe_mismatch("--resume", "class table", "that of " + where, "another"));
+  if (!(map.properties == properties))
+    problems.push_back(describe_mismatch("--resume", "property table", "that of " + where, "another"));
+  if (!problems.empty()) throw ConfigError(problems);
+}
+
 int run(const ReconstructArguments& arguments, CommonOptions common) {
   const auto start = Clock::now();
   const InterruptGuard interrupt;  // from the start: a signal while the sequence opens counts too
@@ -213,7 +224,9 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   const Perception perception = perception_of(options.perception, sequence->info().classes);
   const PreparedClasses classes = prepare_classes(options.labels, perception.classes(sequence->info()));
   const TouchPlan touches = plan_touches(options, *sequence, classes.table);
-  prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite || options.resume);
+  const bool goes_on = options.resume && fs::exists(options.out / kMapName);
+  prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite || goes_on);
+  const FileLock writing(options.out, FileLock::Kind::exclusive, 1);
   check_memory(*sequence, options);
   for (const std::string& note : sequence->info().notes) spdlog::warn("{}", note);
   for (const Finding& fault : faults.get())
@@ -233,6 +246,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   std::string touches_done;  // what became of the recorded touches, JSON; empty until they are applied
   if (options.resume)
     if (auto earlier = resume(options.out / kMapName, source.recording, config)) {
+      require_tables_of(earlier->map, classes.table, touches.properties, (options.out / kMapName).string());
       map = std::move(earlier->map);
       report.fusion = std::move(earlier->record);
       scratch.viewpoints.set_seen(std::move(earlier->viewpoints));
@@ -246,7 +260,12 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   };
   fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save, map, scratch,
        report.fusion);
-  if (report.fusion.fused == 0 && report.fusion.stopped.empty())
+  // What lies there may be a good map: an empty one does not replace it.
+  if (report.fusion.fused == 0 && !report.fusion.stopped.empty()) {
+    std::fprintf(stderr, "feltmap: %s before anything was fused: nothing is saved\n", report.fusion.stopped.c_str());
+    return kInterrupted;
+  }
+  if (report.fusion.fused == 0)
     throw FormatError(describe_mismatch(options.sequence.string(), "frames", "at least one that can be fused",
                                         nothing_fused(report.fusion)));
 
@@ -289,6 +308,9 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
     if (!touched.empty()) std::printf("  %zu touches recorded with the sequence\n", touched.size());
   }
   print_refused(touches, touched);
+  if (!touches.file.empty() && report.resumed_after > 0 && touched.empty() && touches_done.empty())
+    spdlog::warn("{}: not applied, as the map was complete before: feltmap touch MAP --file does it",
+                 touches.file.string());
   const FusionRecord& fusion = report.fusion;
   if (fusion.stopped.empty()) return kDone;
   std::fprintf(stderr,

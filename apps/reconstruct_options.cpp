@@ -36,9 +36,6 @@ std::string text_of(double number) {
   return text.str();
 }
 
-/// The double that a person would write for a float: 0.1, not 0.10000000149.
-double short_decimal(float value) { return std::stod(text_of(value)); }
-
 /// Runs checks one after the other and keeps what they found.
 class Problems {
 public:

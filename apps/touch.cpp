@@ -9,6 +9,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/output_files.h"
 #include "apps/touch_options.h"
 #include "inference/decision.h"
 #include "io/map_file/map_file.h"
@@ -25,7 +26,7 @@ struct TouchOptions : CommonOptions {
   std::string map, at, property, file, out, undo, redo, properties, model = "material", projection = "kl";
   double value = 0, sigma = 0, stamp_s = 0;
   std::optional<double> rho;
-  bool dry_run = false, list = false;
+  bool dry_run = false, list = false, force = false;
   RegionOptions region;
   // A touch given by a frame of the sequence and a pixel.
   std::string sequence, masks;
@@ -163,6 +164,9 @@ TouchRequest request_of(const TouchOptions& options) {
 int run_touch(const TouchOptions& options) {
   if (options.list) return list_touches(options);
   const TouchRequest request = request_of(options);
+  const std::string& out_file = options.out.empty() ? options.map : options.out;
+  std::optional<MapWriting> writing;
+  if (!options.dry_run) writing.emplace(out_file);
   Map map = load_map(options.map);
   use_properties(map, options.properties);
   json out;
@@ -204,7 +208,8 @@ int run_touch(const TouchOptions& options) {
     effects.push_back(apply_touch(map, resolve_touch(map, request, view ? &*view : nullptr)));
     out.update(effect_json(map, effects.back(), request.region));
   }
-  out["map_hash"] = options.dry_run ? map_hash(map) : save_map(map, options.out.empty() ? options.map : options.out);
+  if (!options.dry_run && !options.out.empty()) require_nothing_lost(options.out, map, false, options.force);
+  out["map_hash"] = options.dry_run ? map_hash(map) : save_map(map, out_file);
   // Only what is done is said to be.
   if (options.json) {
     print_json(out);
@@ -233,7 +238,7 @@ void add_touch(CLI::App& app) {
   CLI::Option_group& what = *command.add_option_group("What to do");
   what.require_option(1);
   CLI::Option* at = what.add_option("--at", options->at, "World point of a reading, metres: x,y,z")->check(check_point);
-  what.add_option("--file", options->file, "Recorded touches (CSV): all of them, or none");
+  CLI::Option* file = what.add_option("--file", options->file, "Recorded touches (CSV): all of them, or none");
   CLI::Option* frame =
       what.add_option("--frame", options->frame, "Number of the frame of --sequence in which --pixel was touched");
   what.add_option("--undo", options->undo, "Take back the touch with this id");
@@ -242,15 +247,24 @@ void add_touch(CLI::App& app) {
   CLI::Option* property = command.add_option("--property", options->property, "What was measured");
   CLI::Option* value = command.add_option("--value", options->value, "The reading, in the property's unit");
   at->needs(property)->needs(value);
+  file->excludes(property)->excludes(value);
   frame->needs(property)->needs(value);
-  command.add_option("--sequence", options->sequence,
-                     "Recording that --frame, or rows of --file with u and v, speak of");
-  command.add_option("--pixel", options->pixel, "u,v of the touch; with --region mask its region is the segment there")
-      ->delimiter(',')
-      ->expected(2);
-  command.add_option("--masks", options->masks, "Folder of instance images or masks to take that segment from");
-  command.add_option("--sigma", options->sigma, "Standard deviation of the reading's noise")->capture_default_str();
-  command.add_option("--stamp", options->stamp_s, "Time of the touch, seconds")->capture_default_str();
+  CLI::Option* sequence = command.add_option("--sequence", options->sequence,
+                                             "Recording that --frame, or rows of --file with u and v, speak of");
+  CLI::Option* pixel = command.add_option("--pixel", options->pixel,
+                                          "u,v of the touch; with --region mask its region is the segment there");
+  pixel->delimiter(',')->expected(2)->needs(frame);
+  CLI::Option* masks =
+      command.add_option("--masks", options->masks, "Folder of instance images or masks to take that segment from");
+  masks->needs(sequence);
+  CLI::Option* sigma = command.add_option("--sigma", options->sigma, "Standard deviation of the reading's noise");
+  sigma->capture_default_str();
+  CLI::Option* stamp = command.add_option("--stamp", options->stamp_s, "Time of the touch, seconds");
+  stamp->capture_default_str();
+  at->excludes(sequence);
+  // Rows have a property, value, noise and time of their own, a frame its recorded time.
+  file->excludes(sigma)->excludes(stamp);
+  frame->excludes(stamp);
   command.add_option("--model", options->model, "material: the region is one material; mixture: each voxel its own")
       ->check(CLI::IsMember({"material", "mixture"}))
       ->capture_default_str();
@@ -260,6 +274,7 @@ void add_touch(CLI::App& app) {
   command.add_option("--rho", options->rho, "Correlation of readings within a region, instead of the property's");
   command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
   command.add_option("--out", options->out, "Write here instead of in place");
+  command.add_flag("--force", options->force, "Let --out replace a file that is no map of the same frames");
   command.add_flag("--dry-run", options->dry_run, "Say what would change and write nothing");
   options->region.add_to(command);
 }

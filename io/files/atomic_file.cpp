@@ -5,7 +5,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <string>
@@ -17,8 +19,20 @@ namespace felt {
 namespace fs = std::filesystem;
 namespace {
 
-/// Temporary files of a destination begin with this and end with its extension.
+/// Temporary files of a destination begin with this, then come process and serial number and its extension.
 std::string part_prefix(const fs::path& destination) { return destination.stem().string() + ".part-"; }
+
+/// Whether a name is of that form: nothing that a person would call a file of their own.
+bool is_part_of(const fs::path& name, const fs::path& destination) {
+  const std::string stem = name.stem().string(), prefix = part_prefix(destination);
+  if (name.extension() != destination.extension() || !stem.starts_with(prefix)) return false;
+  const size_t dash = stem.find('-', prefix.size());
+  const auto digits = [&](size_t from, size_t to) {
+    return from < to && std::all_of(stem.begin() + ptrdiff_t(from), stem.begin() + ptrdiff_t(to),
+                                    [](unsigned char c) { return std::isdigit(c) != 0; });
+  };
+  return dash != std::string::npos && digits(prefix.size(), dash) && digits(dash + 1, stem.size());
+}
 
 bool gone(int descriptor) {
   struct stat status {};
@@ -101,8 +115,7 @@ void remove_abandoned_parts(const fs::path& destination) {
   std::error_code fault;
   for (const auto& entry : fs::directory_iterator(folder, fault)) {
     const fs::path& path = entry.path();
-    if (!path.filename().string().starts_with(part_prefix(destination)) || path.extension() != destination.extension())
-      continue;
+    if (!is_part_of(path.filename(), destination) || !entry.is_regular_file(fault)) continue;
     const int descriptor = open(path.c_str(), O_WRONLY | O_CLOEXEC);
     if (descriptor < 0) continue;
     if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) unlink(path.c_str());

@@ -12,7 +12,7 @@
 namespace felt {
 
 OpenedFile::OpenedFile(const std::filesystem::path& path)
-    : path_(path), descriptor_(open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
+    : path_(path), descriptor_(open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {
   if (descriptor_ < 0) fail("open");
   struct stat status {};
   if (fstat(descriptor_, &status) != 0) fail("read the size");

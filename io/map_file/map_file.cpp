@@ -133,10 +133,7 @@ VdbCodec codec_of(MapCompression compression, bool noisy) {
                                               : VdbCodec::none;
 }
 
-Map read_map(const fs::path& path, uint64_t bytes) {
-  const std::string where = path.string();
-  const OpenedFile opened(path);
-  const VdbReader file(opened, bytes, where);
+Map read_map(const VdbReader& file, const std::string& where) {
   MapHeader header = read_metadata(file.metadata(), where);
   Map map(header.voxel_size_m, header.truncation_m);
   map.classes = std::move(header.classes);
@@ -175,12 +172,19 @@ std::string save_map(const Map& map, const fs::path& path, const SaveOptions& op
 }
 
 MapJournals load_journals(const fs::path& path) {
-  const uint64_t bytes = verify_map_trailer(path, kMapFileVersion);
+  const std::string where = path.string();
   const OpenedFile opened(path);
-  MapHeader header = read_metadata(VdbReader(opened, bytes, path.string()).metadata(), path.string());
-  return {std::move(header.frames), std::move(header.touches)};
+  MapHeader header =
+      read_metadata(VdbReader(opened, verify_map_trailer(opened, where, kMapFileVersion), where).metadata(), where);
+  return {header.voxel_size_m, std::move(header.classes), std::move(header.properties), std::move(header.frames),
+          std::move(header.touches)};
 }
 
-Map load_map(const fs::path& path) { return read_map(path, verify_map_trailer(path, kMapFileVersion)); }
+Map load_map(const fs::path& path) {
+  // Opened once: another program may replace the file meanwhile.
+  const std::string where = path.string();
+  const OpenedFile opened(path);
+  return read_map(VdbReader(opened, verify_map_trailer(opened, where, kMapFileVersion), where), where);
+}
 
 }  // namespace felt

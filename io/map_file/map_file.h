@@ -37,6 +37,9 @@ Map load_map(const std::filesystem::path& path);
 
 /// What a map was made of.
 struct MapJournals {
+  double voxel_size_m = 0;
+  ClassTable classes;
+  PropertyTable properties;
   FrameJournal frames;
   TouchJournal touches;  ///< without their regions
 };

@@ -62,9 +62,7 @@ std::string MapTrailer::finish(uint32_t version) {
   return trailer;
 }
 
-uint64_t verify_map_trailer(const fs::path& path, uint32_t known_version) {
-  const OpenedFile file(path);
-  const std::string where = path.string();
+uint64_t verify_map_trailer(const OpenedFile& file, const std::string& where, uint32_t known_version) {
   if (file.size() < kMapTrailerBytes)
     throw FormatError(
         describe_mismatch(where, "size", "a map file of more than 48 bytes", std::to_string(file.size()) + " bytes"));

@@ -1,11 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <string>
 
 namespace felt {
+
+class OpenedFile;
 
 /// The end of a map file, after OpenVDB's own data: magic (16 bytes), format version (u32), zero (u32), bytes before
 /// the trailer (u64), and XXH3-128 of everything before it (16 bytes, canonical order). Integers are little-endian.
@@ -31,6 +32,6 @@ private:
 
 /// Checks magic, version, length and checksum; returns the number of bytes before the trailer. Nothing of the content
 /// is interpreted. Throws IoError and FormatError, the latter with the first thing that is wrong.
-uint64_t verify_map_trailer(const std::filesystem::path& path, uint32_t known_version);
+uint64_t verify_map_trailer(const OpenedFile& file, const std::string& where, uint32_t known_version);
 
 }  // namespace felt

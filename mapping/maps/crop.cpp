@@ -68,6 +68,7 @@ Map cropped(const Map& map, const Region& region) {
   result.classes = map.classes;
   result.properties = map.properties;
   result.metadata = map.metadata;
+  result.frames = map.frames;  // so that merging does not count them twice
   for (size_t b = 0; b < region.blocks(); ++b) {
     const Block* block = map.store.get(region.coord[b]);
     if (block == nullptr) continue;

@@ -12,8 +12,8 @@ Region voxels_in(const Map& map, const Eigen::AlignedBox3d& box_m);
 /// The observed voxels whose most probable class is that of a slot, by vision.
 Region voxels_of_class(const Map& map, int slot);
 
-/// A map of the observed voxels of a region: geometry, colour, class counts and tables. All others are unobserved in
-/// it, and it has no touches.
+/// A map of the observed voxels of a region: geometry, colour, class counts, tables, and the frames that they were
+/// made of. All others are unobserved in it, and it has no touches.
 Map cropped(const Map& map, const Region& region);
 Map cropped(const Map& map, const Eigen::AlignedBox3d& box_m);
 

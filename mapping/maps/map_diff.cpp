@@ -77,13 +77,16 @@ std::vector<std::string> different_settings(const Map& a, const Map& b) {
   if (!(a.classes == b.classes))
     lines.push_back("class tables: " + std::to_string(a.classes.size()) + " and " + std::to_string(b.classes.size()) +
                     " classes, not the same rows");
+  if (!(a.properties == b.properties))
+    lines.push_back("property tables: " + std::to_string(a.properties.size()) + " and " +
+                    std::to_string(b.properties.size()) + " properties, not the same values");
   return lines;
 }
 
 struct Channels {
   Accumulator tsdf{"tsdf", "m"}, weight{"weight", ""}, color{"color", "grey levels"},
       color_count{"color_count", "observations"}, even_evidence{"evidence_even", "counts"},
-      instance{"instance", "ids that differ"};
+      instance{"instance", "ids that differ"}, instance_votes{"instance_votes", "votes"};
   struct Evidence {
     std::optional<int> slot_a, slot_b;
     Accumulator sums;
@@ -155,13 +158,14 @@ void compare_evidence(const Block* a, const Block* b, Channels::Evidence& channe
   compare_planes(evidence_of(a, channel.slot_a), evidence_of(b, channel.slot_b), channel.sums);
 }
 
-void compare_instances(const Block* a, const Block* b, Accumulator& channel) {
+void compare_instances(const Block* a, const Block* b, Channels& channels) {
   const InstancePlanes* pa = a != nullptr ? a->instance : nullptr;
   const InstancePlanes* pb = b != nullptr ? b->instance : nullptr;
   if (pa == nullptr && pb == nullptr) return;
   for (int i = 0; i < kBlockVoxels; ++i) {
     const int ia = pa != nullptr ? pa->id[i] : 0, ib = pb != nullptr ? pb->id[i] : 0;
-    channel.add(ia != 0, ib != 0, ia != ib, 0);
+    channels.instance.add(ia != 0, ib != 0, ia != ib, 0);
+    channels.instance_votes.add(ia != 0, ib != 0, pa != nullptr ? pa->votes[i] : 0, pb != nullptr ? pb->votes[i] : 0);
   }
 }
 
@@ -236,7 +240,7 @@ MapDifference difference(const Map& a, const Map& b) {
     for (Channels::Evidence& channel : channels.evidence) compare_evidence(in_a, in_b, channel);
     compare_planes(in_a != nullptr ? in_a->even_evidence : nullptr, in_b != nullptr ? in_b->even_evidence : nullptr,
                    channels.even_evidence);
-    compare_instances(in_a, in_b, channels.instance);
+    compare_instances(in_a, in_b, channels);
     for (Channels::Touched& channel : channels.touched) compare_touched(in_a, in_b, channel);
     result.class_flips += flips(a, b, in_a, in_b);
   }
@@ -244,7 +248,7 @@ MapDifference difference(const Map& a, const Map& b) {
     result.channels.push_back(sums->finish());
   for (Channels::Evidence& channel : channels.evidence) result.channels.push_back(channel.sums.finish());
   // Most maps have neither: then there is nothing to say.
-  for (Accumulator* sums : {&channels.even_evidence, &channels.instance})
+  for (Accumulator* sums : {&channels.even_evidence, &channels.instance, &channels.instance_votes})
     if (const ChannelDifference channel = sums->finish();
         channel.voxels_both + channel.voxels_only_a + channel.voxels_only_b > 0)
       result.channels.push_back(channel);

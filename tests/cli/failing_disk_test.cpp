@@ -77,7 +77,7 @@ TEST_CASE("on a full disk every command that writes fails with the reason and le
   const std::string full = "No space left on device", map = quoted(large / "map.vdb");
   require_refused(reconstruct(disk, "--voxel-size 0.02 --force"), full);
   CHECK((files_in(disk) == before));
-  require_refused("merge " + map + " --out " + quoted(disk / "map.vdb"), full);
+  require_refused("merge " + map + " --force --out " + quoted(disk / "map.vdb"), full);
   require_refused("export " + map + " --vdb " + quoted(disk / "new.vdb"), full);
   require_refused("export " + map + " --vdb " + quoted(disk / "new.vdb") + " --grids tsdf,weight,color", full);
   require_refused("export " + map + " --mesh " + quoted(disk / "mesh.ply") + " --force", full);

@@ -1,0 +1,259 @@
+// Nothing that a map holds is lost to a name, a neighbour or a changed input.
+#include <sys/stat.h>
+
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "io/files/file_lock.h"
+#include "io/images/image_encode.h"
+#include "io/map_file/map_file.h"
+#include "tests/cli/command.h"
+#include "tests/cli/sequences.h"
+#include "tests/support/data.h"
+#include "tests/support/random_map.h"
+#include "tests/support/recorded_sequence.h"
+
+namespace felt::test {
+namespace {
+namespace fs = std::filesystem;
+using Catch::Matchers::Contains;
+using nlohmann::json;
+
+std::string file_text(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+/// A recording of a wall with classes and a property, and where its map goes.
+struct Recording {
+  TemporaryDirectory folder;
+  fs::path sequence = folder.path() / "recording", out = folder.path() / "result", map = out / "map.vdb";
+  explicit Recording(int frames = 4) {
+    write_generic(sequence, frames);
+    write_text(sequence / "properties.yaml",
+               "friction: {priors: {wall: {mean: 0.3, sd: 0.05}, floor: {mean: 0.5, sd: 0.05}}}\n");
+  }
+  CommandResult reconstruct(const std::string& options = "") const {
+    return run_feltmap("reconstruct " + quoted(sequence) + " --out " + quoted(out) + " --voxel-size 0.05 --quiet " +
+                       options);
+  }
+  std::string touch(const std::string& value = "0.4") const {
+    return "touch " + quoted(map) + " --sequence " + quoted(sequence) + " --frame 0 --pixel 12,8 --region sphere " +
+           "--radius 0.3 --property friction --value " + value;
+  }
+};
+
+void refused(const std::string& arguments, int code, const std::string& reason) {
+  const CommandResult result = run_feltmap(arguments);
+  INFO(arguments << "\n" << result.err);
+  CHECK(result.exit_code == code);
+  CHECK_THAT(result.err, Contains(reason));
+}
+
+}  // namespace
+
+TEST_CASE("files of people beside a map stay, also those that are called parts") {
+  const Recording recording;
+  fs::create_directories(recording.out);
+  for (const char* name : {"map.vdb", "map.part-1.vdb", "map.part-kitchen.vdb", "map.part-1-b.vdb", "map.part-7-1.vdb"})
+    write_text(recording.out / name, "mine");
+  CHECK(recording.reconstruct().exit_code == 4);
+  CHECK(fs::exists(recording.out / "map.part-7-1.vdb"));  // nothing is tidied where nothing is begun
+  REQUIRE(recording.reconstruct("--force").exit_code == 0);
+  for (const char* name : {"map.part-1.vdb", "map.part-kitchen.vdb", "map.part-1-b.vdb"})
+    CHECK(file_text(recording.out / name) == "mine");
+  CHECK_FALSE(fs::exists(recording.out / "map.part-7-1.vdb"));
+}
+
+TEST_CASE("a run goes on only with the tables and contents that it began with") {
+  const Recording recording;
+  const fs::path confusion = recording.folder.path() / "confusion.csv";
+  write_text(confusion, "x,wall,floor,sofa\nwall,0.8,0.1,0.1\nfloor,0.1,0.8,0.1\nsofa,0.1,0.1,0.8\n");
+  const std::string options = "--confusion " + quoted(confusion);
+  REQUIRE(recording.reconstruct(options).exit_code == 0);
+  const std::string hash = map_hash(load_map(recording.map));
+  REQUIRE(recording.reconstruct(options + " --resume").exit_code == 0);
+  CHECK(map_hash(load_map(recording.map)) == hash);
+  const auto changed = [&](const fs::path& file, const std::string& from, const std::string& to) {
+    const std::string before = file_text(file);
+    std::string text = before;
+    text.replace(text.find(from), from.size(), to);
+    write_text(file, text);
+    const CommandResult result = recording.reconstruct(options + " --resume");
+    write_text(file, before);
+    CHECK(result.exit_code == 3);
+    return result.err;
+  };
+  CHECK_THAT(changed(recording.sequence / "classes.yaml", "sofa", "chair"), Contains("sofa"));  // the confusion's
+  CHECK_THAT(changed(recording.sequence / "classes.yaml", "name: floor", "name: floor, ignore: true"),
+             Contains("class table"));
+  CHECK_THAT(changed(recording.sequence / "properties.yaml", "0.3", "0.35"), Contains("property table"));
+  CHECK_THAT(changed(confusion, "wall,0.8,0.1", "wall,0.7,0.2"), Contains("confusion_content"));
+  CHECK(map_hash(load_map(recording.map)) == hash);
+}
+
+TEST_CASE("touches that come after a complete run are said not to be applied") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  write_text(recording.sequence / "touches.csv", "frame,u,v,property,value\n0,12,8,friction,0.4\n");
+  const CommandResult result = recording.reconstruct("--resume");
+  CHECK(result.exit_code == 0);
+  CHECK_THAT(result.err, Contains("touches.csv") && Contains("not applied"));
+}
+
+TEST_CASE("commands that change one map wait for each other, and none writes into a folder at work") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const CommandResult four = run_feltmap_within("for i in 1 2 3 4; do ", recording.touch("0.4$i"), " & done; wait");
+  INFO(four.err);
+  CHECK(four.exit_code == 0);
+  CHECK(load_map(recording.map).touches.touches.size() == 4);
+  const std::string before = file_text(recording.map);
+  {
+    const FileLock at_work(recording.out, FileLock::Kind::exclusive, 0);
+    refused(recording.touch(), 4, "another feltmap");
+    refused("merge " + quoted(recording.map) + " --out " + quoted(recording.map), 4, "another feltmap");
+    CHECK(recording.reconstruct("--force").exit_code == 4);
+  }
+  CHECK(file_text(recording.map) == before);
+}
+
+TEST_CASE("a touched copy and a merged map replace only what they hold") {
+  const Recording recording, other(2);
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  write_bytes(other.sequence / "depth" / "0.png", encode_png(Image<uint16_t>(kWidth, kHeight, 3000)));
+  REQUIRE(other.reconstruct().exit_code == 0);
+  const fs::path notes = recording.folder.path() / "notes.txt", finer = recording.folder.path() / "finer";
+  write_text(notes, "mine");
+  const std::string foreign = file_text(other.map);
+  refused(recording.touch() + " --out " + quoted(notes), 4, "--force");
+  refused(recording.touch() + " --out " + quoted(other.map), 4, "frames");
+  CHECK(file_text(notes) == "mine");
+  CHECK(file_text(other.map) == foreign);
+  CHECK(run_feltmap(recording.touch() + " --force --out " + quoted(notes)).exit_code == 0);
+
+  // The same frames in finer voxels, and a touch that is undone in the new map.
+  REQUIRE(run_feltmap("reconstruct " + quoted(recording.sequence) + " --voxel-size 0.02 --quiet --out " + quoted(finer))
+              .exit_code == 0);
+  const std::string merge = "merge " + quoted(recording.map) + " --out ";
+  refused(merge + quoted(finer / "map.vdb"), 4, "voxels");
+  const fs::path touched = recording.folder.path() / "touched.vdb";
+  REQUIRE(run_feltmap(recording.touch() + " --out " + quoted(touched)).exit_code == 0);
+  refused(merge + quoted(touched), 4, "1 touches");
+}
+
+TEST_CASE("a part of a map is not merged with the whole, and no run goes on with it") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const fs::path part = recording.folder.path() / "part" / "map.vdb";
+  fs::create_directories(part.parent_path());
+  REQUIRE(
+      run_feltmap("export " + quoted(recording.map) + " --vdb " + quoted(part) + " --box -1,-1,0,0.2,1,3").exit_code ==
+      0);
+  refused("merge " + quoted(recording.map) + " " + quoted(part) + " --out " + quoted(recording.folder.path() / "m.vdb"),
+          3, "shared");
+  refused(
+      "reconstruct " + quoted(recording.sequence) + " --voxel-size 0.05 --resume --out " + quoted(part.parent_path()),
+      4, "continued");
+}
+
+TEST_CASE("maps whose properties or votes differ are no equal maps") {
+  const TemporaryDirectory folder;
+  const std::string a = (folder.path() / "a.vdb").string(), b = (folder.path() / "b.vdb").string();
+  Map map = random_map({.seed = 3, .blocks = 4, .classes = 2, .instances = true});
+  save_map(map, a);
+  const PropertyTable before = map.properties;
+  Property friction;
+  friction.name = "friction";
+  friction.priors["class 0"] = {0.3, 0.1, 4};
+  map.properties = PropertyTable({friction});
+  save_map(map, b);
+  const CommandResult tables = run_feltmap("diff " + a + " " + b);
+  CHECK(tables.exit_code == 1);
+  CHECK_THAT(tables.out, Contains("property tables"));
+  map.properties = before;
+  for (uint32_t i = 0; i < map.store.size(); ++i)
+    if (InstancePlanes* planes = map.store[i].instance)
+      for (int v = 0; v < kBlockVoxels; ++v) planes->votes[v] = uint16_t(planes->id[v] != 0 ? planes->votes[v] + 1 : 0);
+  save_map(map, b);
+  CHECK(run_feltmap("diff --tol 0 " + a + " " + b).exit_code == 1);
+}
+
+TEST_CASE("a run that can fuse nothing leaves the map that lies there, checkpoints or not") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const std::string before = file_text(recording.map);
+  std::string poses;
+  for (int i = 0; i < 4; ++i) poses += std::to_string(i) + " nan 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n";
+  write_text(recording.sequence / "poses.txt", poses);
+  CHECK(recording.reconstruct("--force --checkpoint 1").exit_code == 4);
+  CHECK(file_text(recording.map) == before);
+}
+
+TEST_CASE("merging keeps the cap of weights that the maps were made with") {
+  const Recording recording(8);
+  REQUIRE(recording.reconstruct("--max-weight 3").exit_code == 0);
+  const fs::path copy = recording.folder.path() / "copy.vdb";
+  REQUIRE(run_feltmap("merge " + quoted(recording.map) + " --out " + quoted(copy)).exit_code == 0);
+  CHECK(map_hash(load_map(copy)) == map_hash(load_map(recording.map)));
+  const std::string twice = "merge " + quoted(recording.map) + " " + quoted(copy) + " --allow-shared-frames --out " +
+                            quoted(recording.folder.path() / "twice.vdb");
+  REQUIRE(run_feltmap(twice).exit_code == 0);
+  float most = 0;
+  const Map merged = load_map(recording.folder.path() / "twice.vdb");
+  for (const Block& block : merged.store.blocks())
+    most = std::max(most, *std::max_element(block.geometry->weight, block.geometry->weight + kBlockVoxels));
+  CHECK(most == 3);
+  const Recording other(2);
+  REQUIRE(other.reconstruct("--max-weight 200").exit_code == 0);
+  const std::string both = "merge " + quoted(recording.map) + " " + quoted(other.map) +
+                           " --allow-shared-frames --out " + quoted(recording.folder.path() / "both.vdb");
+  refused(both, 3, "--max-weight");
+  CHECK(run_feltmap(both + " --max-weight 200").exit_code == 0);
+}
+
+TEST_CASE("merging merged maps keeps every configuration") {
+  const TemporaryDirectory folder;
+  std::vector<std::string> maps;
+  for (int i = 0; i < 4; ++i) {
+    Map map = random_map({.seed = 1, .blocks = 2});
+    map.frames = {};
+    record_frame(map.frames, "recording " + std::to_string(i), "", 0);
+    map.metadata = {{"config", "{\"day\": " + std::to_string(i) + "}"}};
+    maps.push_back((folder.path() / (std::to_string(i) + ".vdb")).string());
+    save_map(map, maps.back());
+  }
+  const std::string two = (folder.path() / "two.vdb").string(), all = (folder.path() / "all.vdb").string();
+  REQUIRE(run_feltmap("merge " + maps[0] + " " + maps[1] + " --out " + two).exit_code == 0);
+  REQUIRE(run_feltmap("merge " + two + " " + maps[2] + " " + maps[3] + " --out " + all).exit_code == 0);
+  std::set<std::string> texts;
+  for (const auto& [key, text] : load_map(all).metadata) texts.insert(text);
+  CHECK(texts.size() == 4);
+}
+
+TEST_CASE("settings are stored with every digit, and a run does not go on with almost the same ones") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct("--label-evidence 0.3333333").exit_code == 0);
+  CHECK(json::parse(load_map(recording.map).metadata.at("config")).at("label_evidence") == 0.3333333);
+  CHECK(recording.reconstruct("--label-evidence 0.333333 --resume").exit_code == 3);
+  CHECK(recording.reconstruct("--label-evidence 0.3333333 --resume").exit_code == 0);
+}
+
+TEST_CASE("what cannot be printed is an error, and a pipe is no map") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  CHECK(run_feltmap_within("", "info --json " + quoted(recording.map), " > /dev/full").exit_code == 4);
+  const fs::path pipe = recording.folder.path() / "pipe";
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  refused("verify " + quoted(pipe), 4, "regular file");
+  // A map is one by its content.
+  fs::copy(recording.map, recording.folder.path() / "map.backup");
+  CHECK(run_feltmap("info " + quoted(recording.folder.path() / "map.backup")).exit_code == 0);
+}
+
+}  // namespace felt::test
