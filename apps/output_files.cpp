@@ -81,6 +81,8 @@ void require_nothing_lost(const fs::path& file, const Map& replacement, bool tou
 
 MapWriting::MapWriting(const fs::path& file)
     : folder_(file.has_parent_path() ? file.parent_path() : fs::path("."), FileLock::Kind::shared, 1),
-      file_(file, FileLock::Kind::exclusive, 60) {}
+      file_(file, FileLock::Kind::exclusive, 60) {
+  remove_abandoned_parts(file);
+}
 
 }  // namespace felt::apps

@@ -23,7 +23,8 @@ void require_no_file(const std::filesystem::path& file, bool overwrite);
 void require_nothing_lost(const std::filesystem::path& file, const Map& replacement, bool touches_too, bool overwrite);
 
 /// Keeps other commands from a map file, and runs of reconstruct from its folder, while it is replaced by what is made
-/// of it. Waits for other commands up to a minute. Throws IoError.
+/// of it. Waits for other commands up to a minute. Half-written files of commands that were killed are removed. Throws
+/// IoError.
 class MapWriting {
 public:
   explicit MapWriting(const std::filesystem::path& file);

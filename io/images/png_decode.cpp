@@ -2,11 +2,11 @@
 
 #include <libdeflate.h>
 
-#include <cstdlib>
 #include <cstring>
 #include <memory>
 
 #include "io/images/image_decode.h"
+#include "io/images/png_unfilter.h"
 
 namespace felt {
 namespace {
@@ -48,44 +48,6 @@ std::span<const uint8_t> image_data(std::span<const uint8_t> png, std::vector<ui
   return joined.empty() ? data : std::span<const uint8_t>(joined);
 }
 
-/// Paeth's predictor (PNG specification, filter 4): of a left, b above, c above left, the one nearest to a + b - c.
-uint8_t paeth(int a, int b, int c) {
-  const int to_a = std::abs(b - c), to_b = std::abs(a - c), to_c = std::abs(a + b - 2 * c);
-  return uint8_t(to_a <= to_b && to_a <= to_c ? a : to_b <= to_c ? b : c);
-}
-
-/// Adds the prediction of the row's filter to each byte in place. `above` is the unfiltered row above, zeros for the
-/// first. N bytes a pixel, known when compiling, keep the left pixel in registers.
-template <int N>
-void unfilter_row(int filter, uint8_t* row, const uint8_t* above, size_t bytes) {
-  uint8_t left[N] = {}, above_left[N] = {};
-  const size_t whole = bytes - bytes % N;
-  switch (filter) {
-    case 1:
-      for (size_t i = 0; i < whole; i += N)
-        for (int k = 0; k < N; ++k) row[i + k] = left[k] = uint8_t(row[i + k] + left[k]);
-      break;
-    case 2:
-      for (size_t i = 0; i < bytes; ++i) row[i] = uint8_t(row[i] + above[i]);
-      break;
-    case 3:
-      for (size_t i = 0; i < whole; i += N)
-        for (int k = 0; k < N; ++k) row[i + k] = left[k] = uint8_t(row[i + k] + (left[k] + above[i + k]) / 2);
-      break;
-    case 4:
-      for (size_t i = 0; i < whole; i += N)
-        for (int k = 0; k < N; ++k) {
-          row[i + k] = left[k] = uint8_t(row[i + k] + paeth(left[k], above[i + k], above_left[k]));
-          above_left[k] = above[i + k];
-        }
-      break;
-  }
-}
-
-using UnfilterRow = void (*)(int, uint8_t*, const uint8_t*, size_t);
-constexpr UnfilterRow kUnfilterRow[9] = {nullptr, unfilter_row<1>, unfilter_row<2>, unfilter_row<3>, unfilter_row<4>,
-                                         nullptr, unfilter_row<6>, nullptr,         unfilter_row<8>};
-
 }  // namespace
 
 void inflate_zlib(std::span<const uint8_t> packed, std::span<uint8_t> out, const std::string& where) {
@@ -107,19 +69,23 @@ PngRows decode_png_rows(std::span<const uint8_t> png, int height, size_t row_byt
   thread_local std::vector<uint8_t> joined;
   const std::span<const uint8_t> packed = image_data(png, joined, where);
 
-  // One row of zeros stands above the first.
+  // One row of zeros stands above the first, a byte that is read behind the last.
   const size_t stride = row_bytes + 1;
-  buffer.resize(stride * (size_t(height) + 1));
+  buffer.resize(stride * (size_t(height) + 1) + 1);
   std::memset(buffer.data(), 0, stride);
   uint8_t* const rows = buffer.data() + stride;
   inflate_zlib(packed, {rows, stride * size_t(height)}, where);
 
-  const UnfilterRow unfilter = kUnfilterRow[pixel_bytes];
   for (size_t v = 0; v < size_t(height); ++v) {
     uint8_t* const row = rows + v * stride;
     if (row[0] > 4)
       throw unreadable(where, "row filters 0 to 4", std::to_string(row[0]) + " in row " + std::to_string(v));
-    if (row[0] != 0) unfilter(row[0], row + 1, row - stride + 1, row_bytes);
+    int paeth = 0;
+    while (paeth < kPaethRows && v + size_t(paeth) < size_t(height) && row[size_t(paeth) * stride] == 4) ++paeth;
+    if (paeth > 1)
+      unfilter_paeth_rows(row + 1, stride, paeth, row_bytes, pixel_bytes), v += size_t(paeth) - 1;
+    else if (row[0] != 0)
+      unfilter_row(row[0], row + 1, row - stride + 1, row_bytes, pixel_bytes);
   }
   return {rows + 1, stride};
 }
