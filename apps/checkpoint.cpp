@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "io/files/json_number.h"
 #include "io/files/json_text.h"
 #include "io/map_file/map_file.h"
 
@@ -68,19 +69,20 @@ json text_of(const Map& map, const char* key, const std::string& where) {
 void read_progress(const json& progress, const std::string& where, Checkpoint& checkpoint) {
   try {
     FusionRecord& record = checkpoint.record;
-    progress.at("read").get_to(record.read);
-    progress.at("fused").get_to(record.fused);
+    record.read = whole_number<int64_t>(progress.at("read"));
+    record.fused = whole_number<int64_t>(progress.at("fused"));
     progress.at("skipped").get_to(record.skipped);
     const json& labels = progress.at("label_voxels");
-    record.labels = {labels.at(0).get<uint64_t>(), labels.at(1).get<uint64_t>(), labels.at(2).get<uint64_t>()};
+    record.labels = {whole_number<uint64_t>(labels.at(0)), whole_number<uint64_t>(labels.at(1)),
+                     whole_number<uint64_t>(labels.at(2))};
     for (const json& row : progress.at("unknown_ids"))
-      record.unknown_ids[row.at(0).get<uint16_t>()] = row.at(1).get<uint64_t>();
+      record.unknown_ids[whole_number<uint16_t>(row.at(0))] = whole_number<uint64_t>(row.at(1));
     progress.at("ignored_pixels").get_to(record.ignored_pixels);
     record.without_labels = progress.value("without_labels", int64_t{0});
     checkpoint.viewpoints = poses_of(progress.at("viewpoints"));
     progress.at("complete").get_to(checkpoint.complete);
     checkpoint.touches = progress.value("touches", "");
-  } catch (const json::exception& fault) {
+  } catch (const std::exception& fault) {
     throw FormatError(describe_mismatch(where, "text 'progress'", "what reconstruct counts", fault.what()));
   }
 }

@@ -43,14 +43,14 @@ int run(const Arguments& a) {
     print_json(json);
   } else if (!a.common.quiet) {
     for (const std::string& what : result.left_out)
-      std::fprintf(stderr, "feltmap: warning: %s left out: the layout %s has no place for them\n", what.c_str(),
-                   a.options.layout.c_str());
+      std::fprintf(stderr, "feltmap: warning: %s left out: the layout %s has no place for them%s\n", what.c_str(),
+                   a.options.layout.c_str(), a.options.renumber ? ", or other frame numbers" : "");
     std::printf("%lld frames written to %s (%s)\n", static_cast<long long>(result.written), a.out.c_str(),
                 a.options.layout.c_str());
     for (const auto& [reason, count] : result.skipped)
       std::printf("  skipped %lld: %s\n", static_cast<long long>(count), reason.c_str());
     if (result.depth_out_of_range > 0)
-      std::printf("  %lld measured pixels are too far for 16 bits at this depth scale\n",
+      std::printf("  %lld measured pixels are too far for 16 bits, or too near for one, at this depth scale\n",
                   static_cast<long long>(result.depth_out_of_range));
   }
   return kDone;

@@ -307,11 +307,15 @@ void add_evaluate(CLI::App& app) {
       ->group(geometry);
   sub.add_flag("--cull-reconstruction", command.geometry.cull_reconstruction,
                "Leave out what the trajectory did not see of the reconstruction, too")
+      ->needs("--trajectory")
       ->group(geometry);
   add_camera_options(sub, command.camera);
   command.intrinsics = sub.get_option("--intrinsics");
-  sub.add_option("--min-depth", command.cameras.min_depth_m, "Metres, of the recording")->capture_default_str();
+  sub.add_option("--min-depth", command.cameras.min_depth_m, "Metres, of the recording")
+      ->check(at_least_zero())
+      ->capture_default_str();
   sub.add_option("--max-depth", command.cameras.max_depth_m, "Metres, of the recording as fused")
+      ->check(above_zero())
       ->capture_default_str();
 
   const char* labels = "Labels";

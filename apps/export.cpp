@@ -47,6 +47,8 @@ void check(const ExportOptions& o) {
   if (!o.box_m.empty() && !(o.box_m[0] < o.box_m[3] && o.box_m[1] < o.box_m[4] && o.box_m[2] < o.box_m[5]))
     problems.push_back(describe_mismatch("--box", "corners in metres", "x0,y0,z0,x1,y1,z1 with x0 < x1 and so on",
                                          nlohmann::json(o.box_m).dump()));
+  if (!o.mesh.empty() && o.mesh == o.points)
+    problems.push_back(describe_mismatch("--points", "file", "another one than --mesh", o.points.string()));
   if (!problems.empty()) throw ConfigError(problems);
   for (const fs::path& file : {o.vdb, o.mesh, o.points, o.html})
     if (!file.empty()) require_no_file(file, o.overwrite);
@@ -190,6 +192,9 @@ void add_export(CLI::App& app) {
       ->group(part);
   command.add_flag("--force", o->overwrite, "Replace files that exist");
   o->segment.add_to(command);
+  for (const char* name : {"--region", "--radius", "--snap", "--band", "--min-weight", "--class-ratio",
+                           "--normal-change", "--color-change", "--mask", "--intrinsics", "--pose"})
+    command.get_option(name)->needs("--segment-at");
 }
 
 }  // namespace felt::apps

@@ -29,8 +29,9 @@ int run_friction(const FrictionOptions& options) {
     normal_from = "given";
   }
   if (!options.map.empty()) {
-    settings.normal = find_contact(load_map(options.map), point_of(options.at), RegionSettings{}).normal;
-    normal_from = "the map's surface at the contact";
+    const Map map = load_map(options.map);
+    settings.normal = surrounding_normal(map, find_contact(map, point_of(options.at), {}), {});
+    normal_from = "the map's surface around the contact";
   }
   const ForceLog log = read_force_log(options.log);
   const FrictionReading reading = friction_reading(log, settings);

@@ -86,8 +86,10 @@ void add_infer(CLI::App& app) {
                      "Write an SVG with the density of the next reading before and after each of the first 20 lines");
   command.add_option("--fit-priors", options->fit_priors,
                      "Instead: fit priors to the readings of a CSV (class, group, value) and print them as JSON");
-  command.add_option("--properties-out", options->properties_out,
-                     "With --fit-priors: write the priors to this properties.yaml too");
+  command
+      .add_option("--properties-out", options->properties_out,
+                  "With --fit-priors: write the priors to this properties.yaml too")
+      ->needs("--fit-priors");
   command.add_option("--property", options->property, "Name of the property in --properties-out")
       ->capture_default_str();
   command.add_option("--unit", options->unit, "Unit of the property in --properties-out")->capture_default_str();

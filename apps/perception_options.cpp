@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "apps/number_checks.h"
 #include "io/files/content_hash.h"
 #include "io/files/text_input.h"
 
@@ -35,6 +36,7 @@ void PerceptionArguments::add_to(CLI::App& command, const char* group, const cha
       .add_option("--segment-color", color_step,
                   "Geometric segments also end where colour steps by this, grey levels; 0: colour does not matter")
       ->capture_default_str()
+      ->check(finite())
       ->check(CLI::Range(0.0, 450.0))
       ->group(group);
 }

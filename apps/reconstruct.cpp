@@ -305,7 +305,9 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
     std::fputs(json.c_str(), stdout);
   } else if (!common.quiet) {
     print_summary(report, options.out);
-    if (!touched.empty()) std::printf("  %zu touches recorded with the sequence\n", touched.size());
+    const auto applied = std::count_if(touched.begin(), touched.end(),
+                                       [](const TouchOutcome& outcome) { return outcome.effect.has_value(); });
+    if (applied > 0) std::printf("  %td touches recorded with the sequence\n", applied);
   }
   print_refused(touches, touched);
   if (!touches.file.empty() && report.resumed_after > 0 && touched.empty() && touches_done.empty())

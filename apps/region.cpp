@@ -6,6 +6,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/number_checks.h"
 #include "apps/touch_options.h"
 #include "io/map_file/map_file.h"
 #include "io/meshes/mesh_io.h"
@@ -30,7 +31,7 @@ int run_region(const RegionCommandOptions& options) {
   const std::optional<ViewMask> view = options.region.view();
   const Region region = view ? find_region(map, *view, settings, &contact) : find_region(map, contact, settings);
   const RegionSummary summary = summarize(map, region, settings);
-  const Belief belief = Beliefs(map).of(region, covering_touches(map, contact.voxel));
+  const Belief belief = Beliefs(map).of(region, covering_touches(map, region));
   if (!options.mesh.empty()) write_mesh(options.mesh, region_mesh(map, region));
   if (options.json) {
     json out = summary_json(map, summary);
@@ -69,7 +70,7 @@ void add_region(CLI::App& app) {
   command.add_option("--at", options->at, "World point, metres: x,y,z")->check(check_point)->required();
   command.add_option("--mesh", options->mesh, "Write the region's surface (.ply, .obj, .glb)");
   command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
-  command.add_option("--below", options->below, "Probability that a property is at most this");
+  command.add_option("--below", options->below, "Probability that a property is at most this")->check(finite());
   options->region.add_to(command);
 }
 

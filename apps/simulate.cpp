@@ -7,6 +7,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/number_checks.h"
 #include "apps/interrupt.h"
 #include "apps/progress.h"
 #include "core/error.h"
@@ -178,10 +179,12 @@ void add_simulate(CLI::App& app) {
       ->capture_default_str();
   command
       .add_option("--sharpness", o.sharpness, "Exponent of the probabilities; above 1 the network is over-confident")
+      ->check(finite())
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();
   command.add_option("--touches", o.touches, "Number of touches")->check(CLI::Range(0, 100000))->capture_default_str();
   command.add_option("--touch-sigma", o.touch_sigma, "Measurement noise of the readings")
+      ->check(finite())
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
   command.add_option("--touch-where", o.touch_where, "Anywhere, or only where the network mistakes the material")

@@ -82,7 +82,9 @@ void add_suggest(CLI::App& app) {
   command.add_option("--region", options->rule, "connected: what a touch would update; segment: the map's segments")
       ->check(CLI::IsMember({"connected", "segment"}))
       ->capture_default_str();
-  command.add_option("--min-voxels", options->settings.min_voxels, "Smallest segment")->capture_default_str();
+  command.add_option("--min-voxels", options->settings.min_voxels, "Smallest segment")
+      ->check(at_least_zero())
+      ->capture_default_str();
 }
 
 }  // namespace felt::apps

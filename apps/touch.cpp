@@ -180,7 +180,10 @@ int run_touch(const TouchOptions& options) {
     const uint64_t id = id_of_text(undo ? options.undo : options.redo);
     undo ? undo_touch(map, id) : redo_touch(map, id);
     out[undo ? "undone" : "redone"] = id_text(id);
-    said = "touch " + id_text(id) + (undo ? ": undone" : ": redone");
+    said = "touch " + id_text(id) +
+           (options.dry_run ? (undo ? ": would be undone" : ": would be redone")
+            : undo          ? ": undone"
+                            : ": redone");
   } else if (!options.file.empty() || options.frame) {
     out["touches"] = json::array();
     const std::optional<OpenedSequence> opened = open_touched(options);
@@ -213,7 +216,7 @@ int run_touch(const TouchOptions& options) {
   // Only what is done is said to be.
   if (options.json) {
     print_json(out);
-  } else {
+  } else if (!options.quiet) {
     if (!said.empty()) std::printf("%s\n", said.c_str());
     for (const TouchEffect& effect : effects) print_effect(map, effect, request.region);
   }

@@ -17,12 +17,13 @@ using json = nlohmann::ordered_json;
 
 std::optional<std::vector<double>> numbers_of(const std::string& text) {
   std::vector<double> numbers;
+  if (text.ends_with(',')) return std::nullopt;
   std::istringstream cells(text);
   for (std::string cell; std::getline(cells, cell, ',');) {
     try {
       size_t used = 0;
       numbers.push_back(std::stod(cell, &used));
-      if (used != cell.size()) return std::nullopt;
+      if (used != cell.size() || !std::isfinite(numbers.back())) return std::nullopt;
     } catch (const std::exception&) {
       return std::nullopt;
     }
@@ -114,6 +115,8 @@ RegionSettings RegionOptions::resolved() const {
 }
 
 std::optional<ViewMask> RegionOptions::view() const {
+  if (rule != "mask" && !(mask.empty() && intrinsics.empty() && pose.empty()))
+    throw ConfigError(describe_mismatch("--mask, --intrinsics, --pose", "region", "--region mask", "--region " + rule));
   if (rule != "mask") return std::nullopt;
   if (mask.empty() || (intrinsics.size() != 4 && intrinsics.size() != 6) || pose.size() != 16)
     throw TouchError("region mask: expected --mask, --intrinsics and --pose, found not all of them");

@@ -94,6 +94,8 @@ struct Panels {
   double peak = 0;
 };
 
+constexpr size_t kMostPanels = 100000;  // thousands of times what sound priors and readings take
+
 Panels choose_panels(const PrecisionPosterior& posterior) {
   const double width = posterior.natural_width();
   std::vector<double> edge, value;
@@ -104,6 +106,8 @@ Panels choose_panels(const PrecisionPosterior& posterior) {
       edge.push_back(t);
       value.push_back(v);
       peak = std::max(peak, v);
+      // Beyond what numbers can hold there is no density to find.
+      if (std::isnan(v) || edge.size() > kMostPanels) break;
       if (v < peak - kNegligible && (step < 0 ? t < last_mode : t > last_mode)) break;
     }
   };

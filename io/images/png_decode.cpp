@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "io/images/image_decode.h"
-#include "io/images/png_unfilter.h"
+#include "io/images/png_row_kernels.h"
 
 namespace felt {
 namespace {

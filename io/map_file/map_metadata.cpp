@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
+#include "io/files/json_number.h"
 #include "io/map_file/map_file.h"
 #include "io/readings/touch_json.h"
 #include "io/tables/property_yaml.h"
@@ -43,11 +44,12 @@ ClassTable classes_from_json(const json& rows) {
   std::vector<ClassInfo> classes;
   for (const json& row : rows) {
     const json& color = row.at("color");
-    classes.push_back({row.at("id").get<uint16_t>(),
-                       row.at("name").get<std::string>(),
-                       {color.at(0).get<uint8_t>(), color.at(1).get<uint8_t>(), color.at(2).get<uint8_t>()},
-                       row.at("ignore").get<bool>(),
-                       row.value("prior", 1.0)});
+    classes.push_back(
+        {whole_number<uint16_t>(row.at("id")),
+         row.at("name").get<std::string>(),
+         {whole_number<uint8_t>(color.at(0)), whole_number<uint8_t>(color.at(1)), whole_number<uint8_t>(color.at(2))},
+         row.at("ignore").get<bool>(),
+         row.value("prior", 1.0)});
   }
   return classes.empty() ? ClassTable() : ClassTable(std::move(classes));
 }
@@ -70,7 +72,7 @@ json frames_to_json(const std::vector<int64_t>& frames) {
 
 /// `left`: how many more frames the whole journal may name.
 std::vector<int64_t> frames_from_json(const json& triples, int64_t& left) {
-  const auto number = [](const json& triple, size_t i) { return triple.at(i).get<int64_t>(); };
+  const auto number = [](const json& triple, size_t i) { return whole_number<int64_t>(triple.at(i)); };
   const int64_t before = left;
   for (const json& triple : triples) {
     const int64_t count = number(triple, 2);

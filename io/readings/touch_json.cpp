@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "io/files/json_number.h"
+
 namespace felt {
 namespace {
 
@@ -89,13 +91,13 @@ Touch touch_from(const json& j) {
   t.request.projection = projection_of_name(j.at("projection").get<std::string>());
   t.request.rho = number(j.at("rho"), kNan);
   t.request.region = settings_from(j.at("region"));
-  t.voxel = {j.at("voxel").at(0).get<int32_t>(), j.at("voxel").at(1).get<int32_t>(),
-             j.at("voxel").at(2).get<int32_t>()};
+  t.voxel = {whole_number<int32_t>(j.at("voxel").at(0)), whole_number<int32_t>(j.at("voxel").at(1)),
+             whole_number<int32_t>(j.at("voxel").at(2))};
   t.surface_m = point_from(j.at("surface_m"));
   t.undone = j.at("undone").get<bool>();
   t.before = summary_from(j.at("before"));
   t.after = summary_from(j.at("after"));
-  t.refused_voxels = j.at("refused_voxels").get<uint64_t>();
+  t.refused_voxels = whole_number<uint64_t>(j.at("refused_voxels"));
   return t;
 }
 

@@ -1,6 +1,7 @@
 #include "mapping/maps/crop.h"
 
-#include "mapping/labels/class_belief.h"
+#include "mapping/touch/touch_update.h"
+#include "mapping/touch/voxel_beliefs.h"
 
 namespace felt {
 namespace {
@@ -59,8 +60,10 @@ Region voxels_in(const Map& map, const Eigen::AlignedBox3d& box_m) {
 }
 
 Region voxels_of_class(const Map& map, int slot) {
-  return observed_voxels(map,
-                         [&](const Block& block, int i) { return class_belief(block, i, map.classes).slot == slot; });
+  const VoxelBeliefs beliefs(map);
+  return observed_voxels(map, [&](const Block& block, int i) {
+    return beliefs.strongest_class({map.store.find(block.coord), uint16_t(i)}) == slot;
+  });
 }
 
 Map cropped(const Map& map, const Region& region) {
@@ -79,6 +82,12 @@ Map cropped(const Map& map, const Region& region) {
     if (inside.any())
       copy_observed(*block, inside, result.store, result.store[result.store.find_or_create(block->coord)]);
   }
+  for (const Touch& touch : map.touches.touches) {
+    Touch part = touch;
+    part.region = intersected(touch.region, region);
+    if (!part.region.empty()) result.touches.touches.push_back(std::move(part));
+  }
+  rebuild_touch_planes(result);
   return result;
 }
 

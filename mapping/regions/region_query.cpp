@@ -174,6 +174,10 @@ Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const Regio
   return contact;
 }
 
+Eigen::Vector3d surrounding_normal(const Map& map, const Contact& contact, const RegionSettings& settings) {
+  return mean_normal(map, contact.voxel, contact.normal, band_rule(map, settings));
+}
+
 double normal_limit_deg(const Map& map, const Contact& contact, const RegionSettings& settings) {
   constexpr double kNoises = 3, kMostDeg = 30;
   if (settings.normal_change_deg >= kMostDeg) return settings.normal_change_deg;

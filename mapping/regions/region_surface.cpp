@@ -206,11 +206,19 @@ std::array<BlockMask, 27> on_planes_of(const BlockNeighbours& near, const BlockM
   return joined;
 }
 
-double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule& rule) {
-  constexpr int kReach = 8;
+namespace {
+
+constexpr int kReach = 8;
+
+bool is_near(const Index3& v, const Index3& centre) {
+  return std::max({std::abs(v.x - centre.x), std::abs(v.y - centre.y), std::abs(v.z - centre.z)}) <= kReach;
+}
+
+/// Calls `visit(tile, local, global)` for every voxel of the band within kReach voxels of `centre`.
+template <typename Visit>
+void for_band_near(const Map& map, const Index3& centre, const SurfaceRule& rule, const Visit& visit) {
   BlockMask everywhere;
   everywhere.word.fill(~uint64_t(0));
-  std::vector<float> cosines;
   const auto examine = [&](const BlockCoord& c) {
     const BlockNeighbours near = neighbours_of(map, c);
     if (near[13] == nullptr) return;
@@ -219,20 +227,9 @@ double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule&
     SurfaceTile tile;
     gather(near, everywhere, rule.min_weight, tile);
     const Index3 f = first_voxel(c);
-    const auto is_near = [&](const Index3& v) {
-      return std::max({std::abs(f.x + v.x - centre.x), std::abs(f.y + v.y - centre.y),
-                       std::abs(f.z + v.z - centre.z)}) <= kReach;
-    };
     for_each_bit(band, [&](int offset) {
-      const Index3 v = voxel_of_offset(offset);
-      if (!is_near(v) || (f.x + v.x + f.y + v.y + f.z + v.z) % 2 != 0) return;  // every other voxel says enough
-      const SurfaceNormal own = smoothed_normal(tile, SurfaceTile::index(v.x, v.y, v.z));
-      for (const Index3& u : {Index3{v.x + 1, v.y, v.z}, {v.x, v.y + 1, v.z}, {v.x, v.y, v.z + 1}}) {
-        const int at = SurfaceTile::index(u.x, u.y, u.z);
-        if (!is_near(u) || !(std::abs(tile.tsdf[at]) <= rule.band_m)) continue;
-        const SurfaceNormal its = smoothed_normal(tile, at);
-        cosines.push_back(own.x * its.x + own.y * its.y + own.z * its.z);
-      }
+      const Index3 v = voxel_of_offset(offset), global{f.x + v.x, f.y + v.y, f.z + v.z};
+      if (is_near(global, centre)) visit(tile, v, global);
     });
   };
   const BlockCoord lo = block_of_voxel({centre.x - kReach, centre.y - kReach, centre.z - kReach}),
@@ -240,10 +237,39 @@ double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule&
   for (int x = lo.x; x <= hi.x; ++x)
     for (int y = lo.y; y <= hi.y; ++y)
       for (int z = lo.z; z <= hi.z; ++z) examine({x, y, z});
+}
+
+}  // namespace
+
+double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule& rule) {
+  std::vector<float> cosines;
+  for_band_near(map, centre, rule, [&](const SurfaceTile& tile, const Index3& v, const Index3& global) {
+    if ((global.x + global.y + global.z) % 2 != 0) return;  // every other voxel says enough
+    const SurfaceNormal own = smoothed_normal(tile, SurfaceTile::index(v.x, v.y, v.z));
+    for (const Index3& step : {Index3{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}) {
+      const int at = SurfaceTile::index(v.x + step.x, v.y + step.y, v.z + step.z);
+      if (!is_near({global.x + step.x, global.y + step.y, global.z + step.z}, centre) ||
+          !(std::abs(tile.tsdf[at]) <= rule.band_m))
+        continue;
+      const SurfaceNormal its = smoothed_normal(tile, at);
+      cosines.push_back(own.x * its.x + own.y * its.y + own.z * its.z);
+    }
+  });
   if (cosines.empty()) return 0;
   const auto middle = cosines.begin() + std::ptrdiff_t(cosines.size() / 2);
   std::nth_element(cosines.begin(), middle, cosines.end());
   return std::acos(std::clamp(double(*middle), -1.0, 1.0)) * 180 / std::numbers::pi;
+}
+
+Eigen::Vector3d mean_normal(const Map& map, const Index3& centre, const Eigen::Vector3d& along,
+                            const SurfaceRule& rule) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for_band_near(map, centre, rule, [&](const SurfaceTile& tile, const Index3& v, const Index3&) {
+    const SurfaceNormal n = smoothed_normal(tile, SurfaceTile::index(v.x, v.y, v.z));
+    const Eigen::Vector3d normal(n.x, n.y, n.z);
+    if (normal.dot(along) > std::numbers::sqrt2 / 2) sum += normal;
+  });
+  return sum.isZero() ? along : sum.normalized();
 }
 
 namespace {

@@ -59,6 +59,11 @@ std::array<BlockMask, 27> on_planes_of(const BlockNeighbours& near, const BlockM
 /// band within eight voxels of it (those ahead of every other voxel). 0 where there are none.
 double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule& rule);
 
+/// Unit mean of the normals of the band within eight voxels of a voxel, of those less than 45 degrees off `along`, a
+/// unit vector: an edge nearby does not turn it. `along` where there are none.
+Eigen::Vector3d mean_normal(const Map& map, const Index3& centre, const Eigen::Vector3d& along,
+                            const SurfaceRule& rule);
+
 /// `fitted_plane` (mapping/regions/interior_kernels.h) at a voxel.
 SurfacePlane surface_plane(const Map& map, const Index3& voxel, float min_weight);
 

@@ -99,6 +99,16 @@ std::vector<uint32_t> covering_touches(const Map& map, const Index3& voxel) {
   return touches;
 }
 
+std::vector<uint32_t> covering_touches(const Map& map, const Region& region) {
+  std::vector<uint32_t> touches;
+  const size_t voxels = region.voxels();
+  for (uint32_t t = 0; t < map.touches.touches.size(); ++t)
+    if (const Touch& touch = map.touches.touches[t];
+        !touch.undone && 2 * intersected(touch.region, region).voxels() > voxels)
+      touches.push_back(t);
+  return touches;
+}
+
 Beliefs::Beliefs(const Map& map) : map_(map) {
   for (const Property& property : map.properties.properties()) priors_.push_back(nig_priors(property, map.classes));
 }

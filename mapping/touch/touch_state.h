@@ -23,6 +23,8 @@ std::vector<double> pooled_belief(const Map& map, const Region& region);
 
 /// Indices (into the journal, ascending) of the active touches that cover a voxel.
 std::vector<uint32_t> covering_touches(const Map& map, const Index3& voxel);
+/// Those that cover more than half of a region: they speak for it as a whole, others for a part of it.
+std::vector<uint32_t> covering_touches(const Map& map, const Region& region);
 
 /// What is believed of a voxel, or of a region whose voxels share their touches.
 struct Belief {

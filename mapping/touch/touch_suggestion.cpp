@@ -54,14 +54,14 @@ double area_of(const Map& map, const Region& region, const RegionSettings& setti
   return area * map.voxel_size_m * map.voxel_size_m / settings.band_voxels;
 }
 
-std::vector<Outcome> outcomes_of(const Belief& belief, const StudentTMixture& next) {
+std::vector<Outcome> outcomes_of(const StudentTMixture& next) {
   std::vector<size_t> order(next.weight.size());
   std::iota(order.begin(), order.end(), size_t(0));
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return next.weight[a] > next.weight[b]; });
   std::vector<Outcome> outcomes;
   for (const size_t c : order) {
     if (next.weight[c] < kLeastOutcome || outcomes.size() == kMostOutcomes) break;
-    Outcome outcome{int(c), belief.class_probability[c], next.component[c].location, {}};
+    Outcome outcome{int(c), next.weight[c], next.component[c].location, {}};
     std::vector<double> log_likelihood;
     for (size_t j = 0; j < next.weight.size(); ++j)
       log_likelihood.push_back(next.weight[j] > 0 ? log_pdf(next.component[j], outcome.reading)
@@ -111,7 +111,7 @@ std::vector<Region> segments(const Map& map, const RegionSettings& settings, siz
         if (const BlockMask bits = region.mask[b] - seen; bits.any()) fresh.append(region.coord[b], bits);
         seen |= region.mask[b];
       }
-      if (fresh.voxels() >= min_voxels) found.push_back(std::move(fresh));
+      if (!fresh.empty() && fresh.voxels() >= min_voxels) found.push_back(std::move(fresh));
     }
   }
   return found;
@@ -133,7 +133,7 @@ std::vector<Suggestion> suggest_touches(const Map& map, const std::string& prope
   std::vector<Suggestion> all;
   for (const Region& region : segments(map, settings.region, settings.min_voxels)) {
     const Index3 middle = middle_of(region);
-    const Belief belief = beliefs.of(region, covering_touches(map, middle));
+    const Belief belief = beliefs.of(region, covering_touches(map, region));
     const StudentTMixture& next = belief.next_reading[size_t(*index)];
     if (next.weight.empty()) continue;
     Suggestion s;
@@ -145,7 +145,7 @@ std::vector<Suggestion> suggest_touches(const Map& map, const std::string& prope
     s.area_m2 = area_of(map, region, settings.region);
     s.gain_nat = information_gain(next).value;
     s.class_probability = belief.class_probability;
-    s.outcomes = outcomes_of(belief, next);
+    s.outcomes = outcomes_of(next);
     all.push_back(std::move(s));
   }
   std::stable_sort(all.begin(), all.end(), [](const Suggestion& a, const Suggestion& b) {

@@ -117,8 +117,12 @@ void check_reading(const PropertyTable& properties, const ClassTable& classes, c
     throw TouchError(describe_mismatch(where, "value",
                                        "a number in [" + number(p.support_lo) + ", " + number(p.support_hi) + "]",
                                        number(request.value)));
-  if (!std::isfinite(request.sigma) || request.sigma < 0)
-    throw TouchError(describe_mismatch(where, "sigma", "0 or a positive number", number(request.sigma)));
+  // Squares of what is kept must fit a float.
+  constexpr double kLargest = 1e15;
+  if (std::abs(request.value) > kLargest)
+    throw TouchError(describe_mismatch(where, "value", "a number of size up to 1e15", number(request.value)));
+  if (!(request.sigma >= 0 && request.sigma <= kLargest))
+    throw TouchError(describe_mismatch(where, "sigma", "a number from 0 to 1e15", number(request.sigma)));
   if (!std::isfinite(request.stamp_s))
     throw TouchError(describe_mismatch(where, "stamp", "a finite time", number(request.stamp_s)));
   if (!std::isnan(request.rho) && !(request.rho >= 0 && request.rho < 1))
@@ -150,11 +154,10 @@ uint64_t add_touch(Map& map, Touch touch) {
 }
 
 TouchEffect apply_touch(Map& map, Touch touch) {
-  const Index3 contact = touch.voxel;
   const double psi = touch.request.value;
   const size_t property = size_t(*map.properties.index_of(touch.request.property));
   TouchEffect effect;
-  effect.before = Beliefs(map).of(touch.region, covering_touches(map, contact));
+  effect.before = Beliefs(map).of(touch.region, covering_touches(map, touch.region));
   const TouchedLabels before = touched_labels(map, touch.region);
   const StudentTMixture& expected = effect.before.next_reading[property];
   if (!expected.weight.empty()) {
@@ -164,12 +167,8 @@ TouchEffect apply_touch(Map& map, Touch touch) {
   effect.id = insert(map.touches, std::move(touch));
   Touch& recorded = *map.touches.find(effect.id);
   try {
-    std::vector<uint32_t> touches = covering_touches(map, contact);
-    // Class noise can keep the contact's own voxel out of the region that grows around it.
     const auto own = uint32_t(&recorded - map.touches.touches.data());
-    if (const auto at = std::lower_bound(touches.begin(), touches.end(), own); at == touches.end() || *at != own)
-      touches.insert(at, own);
-    effect.after = Beliefs(map).of(recorded.region, touches);
+    effect.after = Beliefs(map).of(recorded.region, covering_touches(map, recorded.region));
     const TouchedLabels after = touched_labels(map, recorded.region);
     for (size_t i = 0; i < after.label.size(); ++i) effect.relabelled += before.label[i] != after.label[i];
     effect.refused = after.refused[own];

@@ -117,7 +117,12 @@ TEST_CASE("what cannot be touched is refused with one line and leaves the file a
   refused("--at 0.2,0,0 --property friction --value 0.3 --region sphere", 4, "finite radius");
   refused("--at 0.2,0,-0.085 --property friction --value 0.3", 4, "inside of something");
   refused("--at 0.2,0,-0.3 --property friction --value 0.3", 4, "outside the map");
-  refused("--at nan,0,0 --property friction --value 0.3", 4, "finite coordinates");
+  refused("--at nan,0,0 --property friction --value 0.3", 2, "x,y,z");
+  refused("--at 0.2,0,0, --property friction --value 0.3", 2, "x,y,z");
+  refused("--at 0.2,0,0 --property friction --value 1e16", 4, "1e15");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --sigma 1e160", 4, "sigma");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --pixel 1,2", 2, "--frame");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --mask m.png", 3, "--region mask");
   refused("--at 0.2,0,0 --property friction --value inf", 4, "value");
   refused("--at 0.2,0,0 --property friction --value 0.3 --sigma=-1", 4, "sigma");
   refused("--at 0.2,0,0 --property friction --value 0.3 --stamp nan", 4, "stamp");
@@ -148,6 +153,44 @@ TEST_CASE("a surface that only ignored classes cover cannot be touched") {
   CHECK(result.exit_code == 4);
   CHECK_THAT(result.err, Catch::Contains("without labels (an ignored class, or never labelled)"));
   CHECK(bytes_of(path) == before);
+}
+
+TEST_CASE("a touch of a small part speaks for that part, not for the surface around it") {
+  const TemporaryDirectory folder;
+  const std::string map = save_floor(folder);
+  ask("touch " + map + " --at=-0.2,0,0 --property friction --value 0.139 --region sphere --radius 0.05");
+  // Whichever of its voxels is asked for, the floor as a whole is what it was.
+  for (const char* at : {"-0.2,0,0", "-0.1,0.2,0"}) {
+    INFO(at);
+    const json region = ask("region " + map + " --at=" + at);
+    CHECK(region["belief"]["class"] == "snow");
+    CHECK(region["belief"]["properties"]["friction"]["touches"] == 0);
+  }
+  CHECK(ask("query " + map + " --at=-0.2,0,0")["points"][0]["class"] == "ice");
+  // A touch of all of it is of the floor, also where the contact is in that part.
+  const json touched = ask("touch " + map + " --at=-0.2,0,0 --property friction --value 0.4");
+  CHECK(touched["before"]["class"] == "snow");
+  CHECK(ask("region " + map + " --at=-0.1,0.2,0")["belief"]["properties"]["friction"]["touches"] == 1);
+}
+
+TEST_CASE("an exported part keeps what touches taught, and a class is what is believed with them") {
+  const TemporaryDirectory folder;
+  const std::string map = save_floor(folder), part = (folder.path() / "part.vdb").string(),
+                    mesh = (folder.path() / "ice.ply").string();
+  ask("touch " + map + " --at=-0.2,0,0 --property friction --value 0.139");
+  REQUIRE(run_feltmap("export " + map + " --vdb " + part + " --box=-0.3,-0.3,-1,0.3,0.3,1").exit_code == 0);
+  const json of_map = ask("query " + map + " --at=-0.1,0.1,0")["points"][0],
+             of_part = ask("query " + part + " --at=-0.1,0.1,0")["points"][0];
+  CHECK(of_map["class"] == "ice");
+  CHECK(of_part["class"] == "ice");
+  CHECK(of_part["properties"] == of_map["properties"]);
+  CHECK(run_feltmap("verify " + part).exit_code == 0);
+  // Undoing works there, too.
+  const std::string id = ask("touch " + part + " --list")["touches"][0]["id"];
+  ask("touch " + part + " --undo " + id);
+  CHECK(ask("query " + part + " --at=-0.1,0.1,0")["points"][0]["class"] == "snow");
+  CHECK(run_feltmap("export " + map + " --class ice --mesh " + mesh).exit_code == 0);
+  CHECK(run_feltmap("export " + map + " --class snow --mesh " + mesh + " --force").exit_code == 3);
 }
 
 TEST_CASE("the region command shows what a touch would update and writes it as a mesh") {

@@ -1,4 +1,4 @@
-#include "io/images/png_unfilter.h"
+#include "io/images/png_row_kernels.h"
 
 #include <catch2/catch.hpp>
 #include <random>

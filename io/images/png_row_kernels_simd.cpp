@@ -1,5 +1,5 @@
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "io/images/png_unfilter_simd.cpp"
+#define HWY_TARGET_INCLUDE "io/images/png_row_kernels_simd.cpp"
 #include <hwy/foreach_target.h>  // must come before highway.h
 #include <hwy/highway.h>
 
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/simd.h"
-#include "io/images/png_unfilter.h"
+#include "io/images/png_row_kernels.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace felt::HWY_NAMESPACE {
