@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <memory>
+#include <numbers>
 #include <string>
 
 #include "apps/command.h"
@@ -24,17 +26,23 @@ struct FrictionOptions : CommonOptions {
 int run_friction(const FrictionOptions& options) {
   FrictionSettings settings = options.settings;
   std::string normal_from = "assumed: the z axis";
+  double normal_sd_rad = 0;
   if (!options.normal.empty()) {
     settings.normal = point_of(options.normal);
     normal_from = "given";
   }
   if (!options.map.empty()) {
     const Map map = load_map(options.map);
-    settings.normal = surrounding_normal(map, find_contact(map, point_of(options.at), {}), {});
+    const FittedNormal fitted = surrounding_normal(map, find_contact(map, point_of(options.at), {}), {});
+    settings.normal = fitted.normal;
+    normal_sd_rad = fitted.sd_rad;
     normal_from = "the map's surface around the contact";
   }
   const ForceLog log = read_force_log(options.log);
-  const FrictionReading reading = friction_reading(log, settings);
+  FrictionReading reading = friction_reading(log, settings);
+  // mu = tan(angle between force and normal): d mu = (1 + mu^2) d angle.
+  reading.kinetic_sd =
+      std::hypot(reading.kinetic_sd, (1 + reading.kinetic_mean * reading.kinetic_mean) * normal_sd_rad);
   if (!options.plot.empty()) write_plot_svg(options.plot, friction_plots(log, reading));
   const double stamp_s = log.time_s[reading.slide_begin];
   char stamp[64], value[64];
@@ -52,6 +60,7 @@ int run_friction(const FrictionOptions& options) {
                    {"sliding_s", {time(reading.slide_begin), time(reading.slide_end)}},
                    {"normal", point_json(settings.normal)},
                    {"normal_from", normal_from},
+                   {"normal_sd_deg", normal_sd_rad * 180 / std::numbers::pi},
                    {"touch", touch}};
     print_json(out);
     return kDone;

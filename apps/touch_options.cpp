@@ -96,8 +96,10 @@ void RegionOptions::add_to(CLI::App& command) {
       .add_option("--normal-change", settings.normal_change_deg,
                   "Largest angle between neighbours, degrees; noisy surfaces raise it, to 30 at most")
       ->capture_default_str();
-  command.add_option("--color-change", settings.color_change,
-                     "Largest difference from the contact's colour, grey levels");
+  command.add_option(
+      "--color-change", settings.color_change,
+      "Largest difference from the contact's colour, grey levels; with --region segment between neighbours, "
+      "CIE Lab");
   command.add_option("--mask", mask, "Image whose non-zero pixels belong to the region (with --region mask)");
   command.add_option("--intrinsics", intrinsics, "Camera of the mask: fx,fy,cx,cy or fx,fy,cx,cy,width,height")
       ->delimiter(',')

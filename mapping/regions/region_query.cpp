@@ -174,8 +174,8 @@ Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const Regio
   return contact;
 }
 
-Eigen::Vector3d surrounding_normal(const Map& map, const Contact& contact, const RegionSettings& settings) {
-  return mean_normal(map, contact.voxel, contact.normal, band_rule(map, settings));
+FittedNormal surrounding_normal(const Map& map, const Contact& contact, const RegionSettings& settings) {
+  return fitted_normal(map, contact.voxel, contact.normal, band_rule(map, settings));
 }
 
 double normal_limit_deg(const Map& map, const Contact& contact, const RegionSettings& settings) {

@@ -9,6 +9,7 @@
 #include "core/camera.h"
 #include "core/image.h"
 #include "mapping/map.h"
+#include "mapping/regions/region_surface.h"
 #include "mapping/store/region.h"
 #include "mapping/store/region_settings.h"
 
@@ -55,9 +56,9 @@ Region find_region(const Map& map, const Contact& contact, const RegionSettings&
 /// most 30. A crease stops every region whose limit is below half the angle by which the surface turns (docs/touch.md).
 double normal_limit_deg(const Map& map, const Contact& contact, const RegionSettings& settings);
 
-/// Unit normal of the surface around a contact, towards free space: mean over the band within eight voxels. That of a
-/// single voxel (Contact::normal) is off by several degrees on a noisy surface.
-Eigen::Vector3d surrounding_normal(const Map& map, const Contact& contact, const RegionSettings& settings);
+/// Unit normal of the surface around a contact, towards free space: of the plane that fits it within eight voxels. That
+/// of a single voxel (Contact::normal) is off by several degrees on a noisy surface.
+FittedNormal surrounding_normal(const Map& map, const Contact& contact, const RegionSettings& settings);
 
 /// The surface voxels seen in the mask: those that project onto a non-zero pixel and are not hidden, by more than two
 /// voxels, behind nearer surface voxels. Throws TouchError where the mask has not the camera's size, sees nothing of

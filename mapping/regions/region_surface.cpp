@@ -1,5 +1,6 @@
 #include "mapping/regions/region_surface.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -261,15 +262,31 @@ double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule&
   return std::acos(std::clamp(double(*middle), -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
-Eigen::Vector3d mean_normal(const Map& map, const Index3& centre, const Eigen::Vector3d& along,
-                            const SurfaceRule& rule) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for_band_near(map, centre, rule, [&](const SurfaceTile& tile, const Index3& v, const Index3&) {
-    const SurfaceNormal n = smoothed_normal(tile, SurfaceTile::index(v.x, v.y, v.z));
+FittedNormal fitted_normal(const Map& map, const Index3& centre, const Eigen::Vector3d& along,
+                           const SurfaceRule& rule) {
+  std::vector<Eigen::Vector3d> points;  // of the surface, voxels from the centre
+  for_band_near(map, centre, rule, [&](const SurfaceTile& tile, const Index3& v, const Index3& global) {
+    const int at = SurfaceTile::index(v.x, v.y, v.z);
+    const SurfaceNormal n = smoothed_normal(tile, at);
     const Eigen::Vector3d normal(n.x, n.y, n.z);
-    if (normal.dot(along) > std::numbers::sqrt2 / 2) sum += normal;
+    if (normal.dot(along) > std::numbers::sqrt2 / 2)
+      points.push_back(Eigen::Vector3d(global.x - centre.x, global.y - centre.y, global.z - centre.z) -
+                       double(tile.tsdf[at] / rule.voxel_m) * normal);
   });
-  return sum.isZero() ? along : sum.normalized();
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : points) middle += p / double(points.size());
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& p : points) spread += (p - middle) * (p - middle).transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);
+  // Points along a line, or none, lie in many planes.
+  if (points.size() < 3 || !(axes.eigenvalues()(1) > 4 * std::abs(axes.eigenvalues()(0)))) return {along, 0};
+  const Eigen::Vector3d normal = axes.eigenvectors().col(0);
+  // Least squares' own error of a slope, as if the three layers of the band were one: they share their measurements.
+  // On the simulated ice crossing's floor, 40 places, it says 0.56 degrees where normals are off by 0.55 an axis.
+  constexpr double kSharing = 3;
+  const double residual2 = std::max(0.0, axes.eigenvalues()(0)) / double(points.size());
+  return {normal.dot(along) < 0 ? Eigen::Vector3d(-normal) : normal,
+          std::sqrt(kSharing * residual2 / axes.eigenvalues()(1))};
 }
 
 namespace {

@@ -59,10 +59,15 @@ std::array<BlockMask, 27> on_planes_of(const BlockNeighbours& near, const BlockM
 /// band within eight voxels of it (those ahead of every other voxel). 0 where there are none.
 double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule& rule);
 
-/// Unit mean of the normals of the band within eight voxels of a voxel, of those less than 45 degrees off `along`, a
-/// unit vector: an edge nearby does not turn it. `along` where there are none.
-Eigen::Vector3d mean_normal(const Map& map, const Index3& centre, const Eigen::Vector3d& along,
-                            const SurfaceRule& rule);
+struct FittedNormal {
+  Eigen::Vector3d normal;
+  double sd_rad = 0;  ///< about how far it may be off
+};
+
+/// Unit normal of the plane that fits the surface within eight voxels of a voxel best (least squares), where its own
+/// normals are less than 45 degrees off `along`, a unit vector: an edge nearby does not turn it. `along` where no plane
+/// fits.
+FittedNormal fitted_normal(const Map& map, const Index3& centre, const Eigen::Vector3d& along, const SurfaceRule& rule);
 
 /// `fitted_plane` (mapping/regions/interior_kernels.h) at a voxel.
 SurfacePlane surface_plane(const Map& map, const Index3& voxel, float min_weight);

@@ -150,6 +150,35 @@ TEST_CASE("the limit between normals grows with their noise, up to 30 degrees, a
   }
 }
 
+TEST_CASE("the normal around a contact is that of the plane, noise or not, and a wall beside it does not turn it") {
+  std::mt19937 rng(2);
+  std::normal_distribution<double> noise;
+  const Eigen::Vector3d tilted = Eigen::Vector3d(0.1, -0.05, 1).normalized();
+  for (const double noise_voxels : {0.0, 0.3}) {
+    const Map map = labelled_map(
+        kVoxel, {-0.5, -0.5, -0.3}, {0.5, 0.5, 0.3},
+        [&](const Eigen::Vector3d& p) { return tilted.dot(p) + noise_voxels * kVoxel * noise(rng); },
+        class_table({"floor"}), [](const Eigen::Vector3d&) { return 0; });
+    double worst_single = 0;
+    for (const double x : {-0.2, 0.0, 0.2}) {
+      const Eigen::Vector3d at = Eigen::Vector3d(x, 0.1, 0) - tilted.dot(Eigen::Vector3d(x, 0.1, 0)) * tilted;
+      const Contact contact = find_contact(map, at, {});
+      const FittedNormal fitted = surrounding_normal(map, contact, {});
+      const double off = std::acos(std::min(1.0, fitted.normal.dot(tilted)));
+      INFO(noise_voxels << " voxels of noise at " << x << ": off by " << off << ", said to be " << fitted.sd_rad);
+      CHECK(off <= 4 * fitted.sd_rad + 1e-3);
+      CHECK(fitted.sd_rad < 0.02);
+      worst_single = std::max(worst_single, std::acos(std::min(1.0, contact.normal.dot(tilted))));
+    }
+    if (noise_voxels > 0) CHECK(worst_single > 0.03);  // a voxel's own
+  }
+  const Map corner = labelled_map(
+      kVoxel, {-0.5, -0.5, -0.3}, {0.5, 0.5, 0.6},
+      [](const Eigen::Vector3d& p) { return std::min(p.z(), 0.1 - p.x()); }, class_table({"floor"}),
+      [](const Eigen::Vector3d&) { return 0; });
+  CHECK(surrounding_normal(corner, find_contact(corner, {0, 0, 0}, {}), {}).normal.z() > 0.999);
+}
+
 TEST_CASE("a region stops at the border of another class and passes voxels with little contrary evidence") {
   Map map = room_corner([](const Eigen::Vector3d& p) { return p.z() > 0.1 ? 1 : p.x() < 0 ? 2 : 0; });
   add_evidence(map, {20, 3, 0}, 1, 3);
