@@ -77,8 +77,9 @@ void add_infer(CLI::App& app) {
        R"(echo '{"prior": {"alpha": [1, 1], "tau": [0.39, 0.19], "kappa": [50, 50], "beta": [25, 25], "gamma": [0.126, 0.053]}, "rho": 0.5, "psi": [0.15]}' | feltmap infer)"},
       *options, [options] { return run_infer(*options); });
   command
-      .add_option("--precision", options->precision,
-                  "f64: the functions that specify the models; f32: the batch kernels that a map runs")
+      .add_option(
+          "--precision", options->precision,
+          "f64: the functions that specify the models; f32: the batch kernels, of which maps run those of mixture")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, InferPrecision>{{"f64", InferPrecision::f64}, {"f32", InferPrecision::f32}}))
       ->default_str("f64");
