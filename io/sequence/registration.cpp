@@ -22,14 +22,16 @@ Image<Pixel> registered_to_depth(const Image<Pixel>& image, const PinholeCamera&
   Image<Pixel> registered(width, height, outside);
   const bool same_place = T_image_depth.isIdentity(0);
   if (same_place && distortion.none()) {
-    std::vector<int> column(width);
+    std::vector<int> column(static_cast<size_t>(width));
     for (int u = 0; u < width; ++u)
-      column[u] = nearest_pixel(camera.project(depth_camera.ray(u, 0)).x(), image.width());
+      column[size_t(u)] = nearest_pixel(camera.project(depth_camera.ray(u, 0)).x(), image.width());
     for (int v = 0; v < height; ++v) {
       const int source_row = nearest_pixel(camera.project(depth_camera.ray(0, v)).y(), image.height());
       if (source_row < 0) continue;
+      const Pixel* const from = image.row(source_row);
+      Pixel* const to = registered.row(v);
       for (int u = 0; u < width; ++u)
-        if (column[u] >= 0) registered(u, v) = image(column[u], source_row);
+        if (column[size_t(u)] >= 0) to[u] = from[column[size_t(u)]];
     }
     return registered;
   }
