@@ -3,6 +3,7 @@
 #include <libdeflate.h>
 #include <turbojpeg.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
