@@ -17,7 +17,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET != HWY_SCALAR  // which has no vectors of eight lanes
 constexpr hn::Full128<int16_t> kWords;
-constexpr hn::Full128<uint8_t> kBytes;
 constexpr hn::Full64<uint8_t> kHalf;
 using Words = hn::Vec<hn::Full128<int16_t>>;
 
