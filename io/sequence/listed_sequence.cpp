@@ -41,6 +41,8 @@ std::string read_source(const ImageSource& source, const std::string& kind) {
       throw Skip{"unreadable " + kind + " image", problem.what()};
     }
   }
+  if (source.bytes > kImageFileLimitBytes)
+    throw Skip{"too large " + kind + " image", source.path.string() + ": " + std::to_string(source.bytes) + " bytes"};
   std::ifstream file(source.path, std::ios::binary);
   std::string bytes(source.bytes, '\0');
   if (!file.seekg(std::streamoff(source.offset)) || !file.read(bytes.data(), std::streamsize(bytes.size())))
@@ -189,7 +191,7 @@ void ListedSequence::find_camera(const fs::path& path) {
 
 void ListedSequence::check_color_camera(const fs::path& path) const {
   for (const FrameRecord& frame : listing_.frames) {
-    if (frame.color.empty()) continue;
+    if (frame.color.empty() || !frame.fault.empty()) continue;
     ImageHeader header;
     try {
       header = decoded(frame.color, "colour", read_image_header);
