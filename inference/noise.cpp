@@ -94,7 +94,7 @@ struct Panels {
   double peak = 0;
 };
 
-constexpr size_t kMostPanels = 100000;  // thousands of times what sound priors and readings take
+constexpr size_t kMostPanels = 1'000'000;  // thousands of times what sound priors and readings take
 
 Panels choose_panels(const PrecisionPosterior& posterior) {
   const double width = posterior.natural_width();
@@ -223,7 +223,12 @@ MaterialClass noisy_material_class(const Nig& prior, std::span<const double> psi
   if (std::all_of(noise_sd.begin(), noise_sd.end(), [](double s) { return s == 0; })) {
     return material_class(prior, statistics_of(psi), rho);
   }
-  const auto by = needs_quadrature(prior, psi, noise_sd, rho) ? quadrature_material_class : tempered_material_class;
+  // Such a prior knows its precision to a thousandth: readings are Gaussian, for which tempering is exact, and the
+  // density over the precision is too narrow for panels.
+  constexpr double kKnownPrecision = 1e6;
+  const auto by = prior.beta <= kKnownPrecision && needs_quadrature(prior, psi, noise_sd, rho)
+                      ? quadrature_material_class
+                      : tempered_material_class;
   return by(prior, psi, noise_sd, rho);
 }
 

@@ -73,6 +73,18 @@ TEST_CASE("several noisy readings of one region: where the closed form is used i
   CHECK(worst_outside > 0.1);
 }
 
+TEST_CASE("a class that knows its precision adds noise as Gaussians do, however much it knows") {
+  // Variance 0.04 of readings, 0.02 of the mean, 0.09 of the noise.
+  for (const double beta : {2e6, 1e8, 1e15, 1e22, 1e40}) {
+    INFO(beta);
+    const NoisyReading after = noisy_update({0.1, 2, beta, 0.04 * beta}, 0.6, 0.3);
+    const double variance = 0.02 + 0.04 + 0.09;
+    CHECK(after.log_evidence == Approx(-0.5 * (0.25 / variance + std::log(2 * M_PI * variance))).margin(1e-5));
+    CHECK(after.posterior.tau == Approx(0.1 + 0.5 * 0.02 / variance).epsilon(1e-5));
+    CHECK(after.posterior.gamma / after.posterior.beta == Approx(0.04).epsilon(1e-5));
+  }
+}
+
 TEST_CASE("the closed form of one reading is the tempered update, whatever the correlation") {
   const Nig p{0.4, 5, 3, 0.03};
   const double psi = 0.55, noise = 0.04, v = 0.01, s = v / (v + noise * noise), d = psi - p.tau;
