@@ -15,7 +15,7 @@ struct ConvertOptions {
   std::string layout = "generic";  ///< one of `writable_layouts()`
   double depth_scale = 0;  ///< stored units per metre; 0: the layout's own, for generic the sequence's or, where it has
                            ///< less than 100 (floating-point depth, scans), millimetres or what reaches as far
-  bool renumber = false;    ///< number frames from 0 in every layout
+  bool renumber = false;   ///< number frames from 0 in every layout
   bool jpeg_color = false;  ///< instead of PNG, which keeps every value
 };
 

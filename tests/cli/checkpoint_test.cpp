@@ -5,7 +5,6 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
-#include <sstream>
 
 #include "io/map_file/map_file.h"
 #include "tests/cli/command.h"
@@ -16,12 +15,6 @@ namespace felt::test {
 namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-std::string file_text(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 std::string reconstruct(const fs::path& sequence, const fs::path& out, const std::string& options = "") {
   return "reconstruct " + quoted(sequence) + " --out " + quoted(out) + " --quiet --voxel-size 0.04 " + options;

@@ -9,15 +9,12 @@
 #include "tests/support/data.h"
 
 namespace felt::test {
-namespace {
 
 std::string file_text(const std::filesystem::path& file) {
   std::ostringstream text;
   text << std::ifstream(file, std::ios::binary).rdbuf();
   return text.str();
 }
-
-}  // namespace
 
 CommandResult run_feltmap(const std::string& arguments, const std::string& input) {
   return run_feltmap_within("", arguments, "", input);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 namespace felt::test {
@@ -16,5 +17,8 @@ CommandResult run_feltmap(const std::string& arguments, const std::string& input
 /// The same with pieces of shell around the command, for limits and signals.
 CommandResult run_feltmap_within(const std::string& before, const std::string& arguments, const std::string& after = "",
                                  const std::string& input = "");
+
+/// All bytes of a file; empty where there is none.
+std::string file_text(const std::filesystem::path& file);
 
 }  // namespace felt::test

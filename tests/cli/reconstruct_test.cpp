@@ -17,12 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-std::string file_text(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
-
 CommandResult reconstruct(const fs::path& sequence, const fs::path& out, const std::string& options = "") {
   return run_feltmap("reconstruct " + quoted(sequence) + " --out " + quoted(out) + " --quiet " + options);
 }

@@ -3,7 +3,6 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <sstream>
 
 #include "tests/cli/command.h"
 #include "tests/support/data.h"
@@ -15,12 +14,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 std::string quoted(const fs::path& path) { return "'" + path.string() + "'"; }
-
-std::string file_text(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 /// A stored scene and a network of three colours.
 struct Setting {

@@ -1,5 +1,6 @@
 #include "tests/support/recorded_sequence.h"
 
+#include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -169,6 +170,12 @@ void write_generic(const fs::path& folder, int frames) {
     poses += number("%d ", i) + matrix_text(pose_at(i).matrix(), " ") + "\n";
   }
   write_text(folder / "poses.txt", poses);
+}
+
+Frame frame_of(const SequenceReader& reader, int64_t i) {
+  ReadResult result = reader.read(i);
+  if (const auto* skip = std::get_if<SkippedFrame>(&result)) FAIL(skip->reason << ": " << skip->detail);
+  return std::get<Frame>(std::move(result));
 }
 
 }  // namespace felt::test

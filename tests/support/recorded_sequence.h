@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/image.h"
+#include "io/sequence/reader.h"
 
 namespace felt::test {
 
@@ -32,5 +33,8 @@ void write_redwood(const std::filesystem::path& folder, int frames);
 void write_icl(const std::filesystem::path& folder, int frames);
 void write_scannet(const std::filesystem::path& folder, int frames);
 void write_generic(const std::filesystem::path& folder, int frames);
+
+/// What `read(i)` gives; the test fails, with the reason, where it is a skip.
+Frame frame_of(const SequenceReader& reader, int64_t i);
 
 }  // namespace felt::test

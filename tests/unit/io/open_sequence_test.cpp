@@ -23,12 +23,6 @@ SkippedFrame skip_of(const SequenceReader& reader, int64_t i) {
   return std::get<SkippedFrame>(result);
 }
 
-Frame frame_of(const SequenceReader& reader, int64_t i) {
-  ReadResult result = reader.read(i);
-  if (const auto* skip = std::get_if<SkippedFrame>(&result)) FAIL(skip->reason << ": " << skip->detail);
-  return std::get<Frame>(std::move(result));
-}
-
 void check_frame(const Frame& frame, int number, double depth_unit_m, int color_error) {
   CHECK(frame.index == number);
   CHECK(frame.camera == PinholeCamera{20, 20, 11.5, 7.5, kWidth, kHeight});

@@ -18,12 +18,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Frame frame_of(const SequenceReader& reader, int64_t i) {
-  const ReadResult read = reader.read(i);
-  if (const auto* skipped = std::get_if<SkippedFrame>(&read)) FAIL(skipped->reason << ": " << skipped->detail);
-  return std::get<Frame>(read);
-}
-
 template <typename T>
 void append(std::string& bytes, const T& value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
