@@ -208,6 +208,10 @@ void check(const EvaluateCommand& c) {
   need(c.reference_readings.empty() || is_map, "--reference-readings", "a map (.vdb)");
   need(!c.class_images || (is_map && !c.reference_labels.empty()), "--class-images",
        "a map (.vdb) and --reference-labels");
+  if (c.cameras.max_depth_m <= c.cameras.min_depth_m)
+    problems.push_back(describe_mismatch("evaluate", "--max-depth, metres",
+                                         "a number above --min-depth, " + Json(c.cameras.min_depth_m).dump(),
+                                         Json(c.cameras.max_depth_m).dump()));
   if (!problems.empty()) throw ConfigError(problems);
 }
 
@@ -297,7 +301,10 @@ void add_evaluate(CLI::App& app) {
       ->check(CLI::Range(size_t(1), size_t(100000000)))
       ->capture_default_str()
       ->group(geometry);
-  sub.add_option("--seed", command.geometry.seed, "Of the samples")->capture_default_str()->group(geometry);
+  sub.add_option("--seed", command.geometry.seed, "Of the samples")
+      ->check(at_least_zero())
+      ->capture_default_str()
+      ->group(geometry);
   sub.add_option("--threshold", command.geometry.threshold_m, "Metres, of precision, recall and F-score")
       ->check(above_zero())
       ->capture_default_str()

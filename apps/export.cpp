@@ -70,7 +70,7 @@ std::optional<Region> part_of_map(const Map& map, const ExportOptions& o) {
   if (!o.box_m.empty()) only(voxels_in(map, {Eigen::Vector3d::Map(o.box_m.data()), Eigen::Vector3d::Map(&o.box_m[3])}));
   if (!o.class_name.empty()) only(voxels_of_class(map, slot_of_class(map, o)));
   if (!o.segment_at.empty()) {
-    const RegionSettings settings = o.segment.resolved();
+    const RegionSettings settings = o.segment.resolved(map);
     const Contact contact = find_contact(map, point_of(o.segment_at), settings);
     const std::optional<ViewMask> view = o.segment.view();
     only(view ? find_region(map, *view, settings, &contact) : find_region(map, contact, settings));
@@ -185,16 +185,11 @@ void add_export(CLI::App& app) {
       ->delimiter(',')
       ->expected(6)
       ->group(part);
-  command
-      .add_option("--segment-at", o->segment_at,
-                  "Only the region that a touch at x,y,z would update (options as there)")
-      ->check(check_point)
-      ->group(part);
+  CLI::Option* segment_at = command.add_option("--segment-at", o->segment_at,
+                                               "Only the region that a touch at x,y,z would update (options as there)");
+  segment_at->check(check_point)->group(part);
   command.add_flag("--force", o->overwrite, "Replace files that exist");
-  o->segment.add_to(command);
-  for (const char* name : {"--region", "--radius", "--snap", "--band", "--min-weight", "--class-ratio",
-                           "--normal-change", "--color-change", "--mask", "--intrinsics", "--pose"})
-    command.get_option(name)->needs("--segment-at");
+  for (CLI::Option* option : o->segment.add_to(command)) option->needs(segment_at);
 }
 
 }  // namespace felt::apps

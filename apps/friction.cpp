@@ -8,6 +8,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/run_settings.h"
 #include "apps/touch_options.h"
 #include "io/files/atomic_file.h"
 #include "io/map_file/map_file.h"
@@ -33,7 +34,9 @@ int run_friction(const FrictionOptions& options) {
   }
   if (!options.map.empty()) {
     const Map map = load_map(options.map);
-    const FittedNormal fitted = surrounding_normal(map, find_contact(map, point_of(options.at), {}), {});
+    RegionSettings around;
+    around.min_weight = least_observed_weight(map);
+    const FittedNormal fitted = surrounding_normal(map, find_contact(map, point_of(options.at), around), around);
     settings.normal = fitted.normal;
     normal_sd_rad = fitted.sd_rad;
     normal_from = "the map's surface around the contact";
@@ -47,7 +50,7 @@ int run_friction(const FrictionOptions& options) {
   const double stamp_s = log.time_s[reading.slide_begin];
   char stamp[64], value[64];
   std::snprintf(stamp, sizeof stamp, "%.6f", stamp_s);
-  std::snprintf(value, sizeof value, "%.4f,%.4f", reading.kinetic_mean, reading.kinetic_sd);
+  std::snprintf(value, sizeof value, "%.4f,%.4g", reading.kinetic_mean, reading.kinetic_sd);
   const std::string touch =
       std::string(stamp) + "," + (options.at.empty() ? "x,y,z" : options.at) + ",friction," + value;
   const std::string touches = "stamp,x,y,z,property,value,sigma\n" + touch + "\n";
@@ -58,6 +61,7 @@ int run_friction(const FrictionOptions& options) {
                    {"static", {{"peak", reading.static_peak}, {"time_s", time(reading.peak)}}},
                    {"contact_s", {time(reading.contact_begin), time(reading.contact_end)}},
                    {"sliding_s", {time(reading.slide_begin), time(reading.slide_end)}},
+                   {"offset_n", point_json(reading.offset_n)},
                    {"normal", point_json(settings.normal)},
                    {"normal_from", normal_from},
                    {"normal_sd_deg", normal_sd_rad * 180 / std::numbers::pi},
@@ -68,6 +72,8 @@ int run_friction(const FrictionOptions& options) {
   std::printf("kinetic %.4f +- %.4f, static peak %.4f (contact normal %.3f,%.3f,%.3f, %s)\n", reading.kinetic_mean,
               reading.kinetic_sd, reading.static_peak, settings.normal.x(), settings.normal.y(), settings.normal.z(),
               normal_from.c_str());
+  if (const double offset_n = reading.offset_n.norm(); offset_n >= 0.01)
+    std::printf("the sensor reads %.2f N without contact: taken off all forces\n", offset_n);
   std::printf("%s", touches.c_str());
   return kDone;
 }
@@ -90,7 +96,10 @@ void add_friction(CLI::App& app) {
   command.add_option("--map", options->map, "Take the normal from this map (forces in the world frame)")
       ->needs(at)
       ->excludes(normal);
-  command.add_option("--cutoff", options->settings.cutoff_hz, "Low-pass cut-off, Hz")->capture_default_str();
+  command
+      .add_option("--cutoff", options->settings.cutoff_hz,
+                  "Low-pass cut-off, Hz: -3 dB of each of two passes, forwards and backwards")
+      ->capture_default_str();
   command.add_option("--contact-force", options->settings.contact_n, "Normal force of a contact, N")
       ->capture_default_str();
   command.add_option("--touch", options->touch, "Write the reading as a touches.csv for `feltmap touch --file`")

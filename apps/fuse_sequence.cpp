@@ -2,6 +2,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include "core/error.h"
+#include "mapping/fusion/block_allocation.h"
 #include "mapping/labels/ignored_classes.h"
 
 namespace felt::apps {
@@ -20,6 +22,17 @@ void count_unknown_ids(const Frame& frame, const ClassTable& classes, std::map<u
     count(frame.probabilities.class_id);
 }
 
+/// Why a frame is not fused: it could not be read, or lies where the map has no room.
+std::optional<SkippedFrame> skip_of(const ReadResult& read, const Map& map, const IntegrationConfig& config) {
+  if (const auto* skipped = std::get_if<SkippedFrame>(&read)) return *skipped;
+  const Frame& frame = std::get<Frame>(read);
+  if (on_map(frame.T_world_camera, map.voxel_size_m, config.max_depth_m + map.truncation_m)) return std::nullopt;
+  return SkippedFrame{
+      frame.index, "pose outside the map",
+      describe_mismatch("pose", "farthest coordinate", "less than 2^30 voxels from the origin",
+                        std::to_string(frame.T_world_camera.translation().cwiseAbs().maxCoeff()) + " m")};
+}
+
 }  // namespace
 
 void fuse_sequence(DecodeAhead& frames, const FrameSource& source, const IntegrationConfig& config,
@@ -27,7 +40,7 @@ void fuse_sequence(DecodeAhead& frames, const FrameSource& source, const Integra
                    FusionRecord& record, const std::function<std::string(const FusionRecord&)>& after_frame) {
   while (std::optional<ReadResult> next = frames.next()) {
     ++record.read;
-    if (const auto* skipped = std::get_if<SkippedFrame>(&*next)) {
+    if (const std::optional<SkippedFrame> skipped = skip_of(*next, map, config)) {
       ++record.skipped[skipped->reason];
       spdlog::info("frame {} skipped: {}: {}", skipped->index, skipped->reason, skipped->detail);
     } else {

@@ -1,7 +1,6 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
-#include <fstream>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -14,6 +13,7 @@
 #include "apps/number_checks.h"
 #include "core/error.h"
 #include "core/simd.h"
+#include "io/files/atomic_file.h"
 #include "io/readings/fit_priors.h"
 #include "io/readings/infer_json.h"
 #include "io/readings/infer_plot.h"
@@ -30,16 +30,19 @@ struct InferOptions : CommonOptions {
   std::string plot;
   std::string fit_priors;
   std::string properties_out, property = "friction", unit = "1";
+  std::vector<double> support;  ///< of the property: lo, hi
   double max_nu_0 = kDefaultPriorReadings;
 };
 
 int run_fit(const InferOptions& options) {
   const std::vector<ClassReadings> readings = read_readings_csv(options.fit_priors);
   if (!options.properties_out.empty()) {
-    const PropertyTable table = fitted_properties(readings, options.property, options.unit, options.max_nu_0);
-    std::ofstream file(options.properties_out);
-    file << properties_yaml(table) << std::flush;
-    if (!file) throw IoError(options.properties_out + ": cannot be written");
+    Property property;
+    property.name = options.property;
+    property.unit = options.unit;
+    property.max_prior_readings = options.max_nu_0;
+    if (!options.support.empty()) property.support_lo = options.support[0], property.support_hi = options.support[1];
+    write_file_atomically(options.properties_out, properties_yaml(fitted_properties(readings, property)));
   }
   std::cout << fit_priors_json(readings, options.max_nu_0) << '\n';
   return kDone;
@@ -83,21 +86,36 @@ void add_infer(CLI::App& app) {
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, InferPrecision>{{"f64", InferPrecision::f64}, {"f32", InferPrecision::f32}}))
       ->default_str("f64");
-  command.add_option("--plot", options->plot,
-                     "Write an SVG with the density of the next reading before and after each of the first 20 lines");
-  command.add_option("--fit-priors", options->fit_priors,
-                     "Instead: fit priors to the readings of a CSV (class, group, value) and print them as JSON");
+  CLI::Option* plot = command.add_option("--plot", options->plot,
+                                         "Write an SVG with the density of the next reading, elsewhere in the class, "
+                                         "before and after each of the first 20 "
+                                         "lines");
+  CLI::Option* fit =
+      command.add_option("--fit-priors", options->fit_priors,
+                         "Instead: fit priors to the readings of a CSV (class, group, value) and print them as JSON");
   command
       .add_option("--properties-out", options->properties_out,
                   "With --fit-priors: write the priors to this properties.yaml too")
-      ->needs("--fit-priors");
+      ->needs(fit);
   command.add_option("--property", options->property, "Name of the property in --properties-out")
+      ->needs("--properties-out")
       ->capture_default_str();
-  command.add_option("--unit", options->unit, "Unit of the property in --properties-out")->capture_default_str();
+  command.add_option("--unit", options->unit, "Unit of the property in --properties-out")
+      ->needs("--properties-out")
+      ->capture_default_str();
+  command
+      .add_option("--support", options->support,
+                  "Least and largest value of the property in --properties-out: 0,inf for friction [all numbers]")
+      ->delimiter(',')
+      ->expected(2)
+      ->needs("--properties-out");
   command.add_option("--max-nu", options->max_nu_0, "Most readings that a fitted prior may stand for")
       ->check(above_zero())
+      ->needs(fit)
       ->capture_default_str();
-  command.add_option("--simd", options->simd, "Target of the kernels: scalar, sse4, avx2, avx3 (best one if absent)");
+  fit->excludes(plot)->excludes("--precision");
+  command.add_option("--simd", options->simd, "Target of the kernels: scalar, sse4, avx2, avx3 (best one if absent)")
+      ->excludes(fit);
 }
 
 }  // namespace felt::apps

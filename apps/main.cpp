@@ -64,7 +64,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::RuntimeError& e) {
     return written(e.get_exit_code());
   } catch (const CLI::Success& e) {
-    return app.exit(e);  // --help, --version
+    return written(app.exit(e));  // --help, --version
   } catch (const CLI::ParseError& e) {
     // CLI11 would only say that a subcommand is missing.
     const std::vector<std::string> unknown = app.remaining();

@@ -11,6 +11,7 @@
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
 #include "apps/output_files.h"
+#include "apps/run_settings.h"
 #include "core/error.h"
 #include "io/map_file/map_file.h"
 #include "mapping/maps/merge.h"
@@ -23,28 +24,19 @@ struct Options {
   std::vector<std::string> maps;
   std::string out;
   MergeOptions merge;
-  std::optional<float> max_weight;
+  std::optional<float> max_weight, max_evidence;
   bool overwrite = false;
 };
 
-/// With the cap that was given, else the one that all maps were made with, else the usual one.
-MergeOptions with_cap(const Options& options, const std::vector<Map>& maps) {
-  MergeOptions merge = options.merge;
-  std::set<float> caps;
-  for (const Map& map : maps)
-    for (const FusedFrames& run : map.frames.runs)
-      if (const auto settings = nlohmann::json::parse(run.settings, nullptr, false);
-          settings.is_object() && settings.contains("max_weight") && settings["max_weight"].is_number())
-        caps.insert(settings["max_weight"].get<float>());
-  if (options.max_weight) {
-    merge.max_weight = *options.max_weight;
-  } else if (caps.size() == 1) {
-    merge.max_weight = *caps.begin();
-  } else if (caps.size() > 1) {
-    throw ConfigError(describe_mismatch("merge", "cap of weights", "the same in all maps, or --max-weight",
+/// The cap that was given, else the one that all maps were made with, else `usual`.
+float cap(const std::optional<float>& given, const std::vector<Map>& maps, const char* key, const char* what,
+          const char* option, float usual) {
+  if (given) return *given;
+  const std::set<double> caps = numbers_of_runs(maps, key);
+  if (caps.size() > 1)
+    throw ConfigError(describe_mismatch("merge", what, std::string("the same in all maps, or ") + option,
                                         std::to_string(*caps.begin()) + " and " + std::to_string(*caps.rbegin())));
-  }
-  return merge;
+  return caps.empty() ? usual : float(*caps.begin());
 }
 
 int run(const Options& options) {
@@ -58,7 +50,12 @@ int run(const Options& options) {
   std::vector<const Map*> pointers;
   for (const std::string& path : options.maps) pointers.push_back(&maps.emplace_back(load_map(path)));
   const auto loaded = Clock::now();
-  const Map result = merge(pointers, with_cap(options, maps));
+  MergeOptions merging = options.merge;
+  merging.max_weight =
+      cap(options.max_weight, maps, "max_weight", "cap of weights", "--max-weight", merging.max_weight);
+  merging.max_evidence =
+      cap(options.max_evidence, maps, "label_cap", "cap of class evidence", "--label-cap", merging.max_evidence);
+  const Map result = merge(pointers, merging);
   const MapWriting writing(options.out);
   require_nothing_lost(options.out, result, true, options.overwrite);
   const auto merged = Clock::now();
@@ -100,6 +97,10 @@ void add_merge(CLI::App& app) {
       .add_option("--max-weight", options->max_weight,
                   "Cap of the summed weight [what the maps were made with, else 255]")
       ->check(above_zero());
+  command
+      .add_option("--label-cap", options->max_evidence,
+                  "Cap of a voxel's class evidence, 0: none [what the maps were made with, else none]")
+      ->check(at_least_zero());
 }
 
 }  // namespace felt::apps

@@ -8,6 +8,9 @@ namespace felt::apps {
 CLI::Validator above_zero();
 CLI::Validator at_least_zero();
 CLI::Validator finite();
+CLI::Validator within(double low, double high);  ///< both ends allowed
+CLI::Validator above_zero_up_to(double high);    ///< not 0, `high` allowed
+CLI::Validator from_zero_to_below(double high);  ///< 0 allowed, not `high`
 
 /// The double that a person would write for a float, 0.1 and not 0.10000000149: the shortest one that is that float.
 double short_decimal(float value);

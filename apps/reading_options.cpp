@@ -18,8 +18,17 @@ void add_reading_options(CLI::App& command, ReadingArguments& a) {
   command.add_option("--depth-scale", a.depth_scale, "Stored depth units per metre")->group(reading);
   command.add_option("--depth-encoding", a.depth_encoding, "plain, or rotated3 (16 bits rotated left by 3)")
       ->group(reading);
-  command.add_flag("--ray-length,!--no-ray-length", a.ray_length, "Depth is the length of the ray, not z")
+  // Callbacks, because a flag bound to an optional is false, not absent, where it is not given: it would overrule what
+  // the sequence says of itself.
+  command
+      .add_flag_callback(
+          "--ray-length", [&a] { a.ray_length = true; }, "Depth is the length of the ray, not z")
       ->group(reading);
+  command
+      .add_flag_callback(
+          "--no-ray-length", [&a] { a.ray_length = false; }, "Depth is z, whatever the sequence says")
+      ->group(reading)
+      ->excludes("--ray-length");
   command.add_option("--pose-convention", a.pose_convention, "c2w or w2c, opencv or opengl; for example w2c,opengl")
       ->group(reading);
   command

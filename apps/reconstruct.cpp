@@ -149,7 +149,7 @@ void write_results(const Map& map, const std::function<std::string()>& save, con
     const auto start = Clock::now();
     std::vector<VertexEdge> edges;
     TriangleMesh mesh = extract_mesh(map, {}, &edges);
-    if (!map.properties.empty()) attach_beliefs(map, edges, mesh);
+    attach_beliefs(map, edges, mesh);
     write_ply(folder / kMeshName, mesh);
     report.mesh_vertices = mesh.positions.size();
     report.mesh_triangles = mesh.triangles.size();

@@ -189,6 +189,10 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   options.labels = overlaid(a.label_settings, file.label_settings);
   for (const std::string& problem : problems_of(options.labels)) problems.add(problem);
   fusion.labels = label_config(options.labels);
+  problems.expect(fusion.labels.max_evidence == 0 || fusion.labels.evidence <= fusion.labels.max_evidence,
+                  "--label-cap", "evidence of a voxel",
+                  "at least that of one observation, " + text_of(fusion.labels.evidence),
+                  text_of(fusion.labels.max_evidence));
   reading.read_instances = fusion.labels.instances || a.perception.vote == SegmentSource::instances;
   problems.expect(a.perception.instances.empty() || reading.read_instances, "--masks", "what they are for",
                   "--vote instances or --instances", "neither");

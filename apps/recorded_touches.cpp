@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "apps/run_settings.h"
 #include "core/error.h"
 #include "io/files/text_input.h"
 #include "io/sequence/open_sequence.h"
@@ -88,7 +89,9 @@ TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& 
 std::vector<TouchOutcome> apply_touches(Map& map, const TouchPlan& plan) {
   if (plan.touches.empty()) return {};
   const TouchedSequence sequence = touched_sequence(*plan.sequence);
-  return apply_recorded_touches(map, plan.touches, {}, &sequence);
+  TouchRequest defaults;
+  defaults.region.min_weight = least_observed_weight(map);
+  return apply_recorded_touches(map, plan.touches, defaults, &sequence);
 }
 
 void print_refused(const TouchPlan& plan, const std::vector<TouchOutcome>& outcomes) {

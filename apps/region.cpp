@@ -24,8 +24,8 @@ struct RegionCommandOptions : CommonOptions {
 };
 
 int run_region(const RegionCommandOptions& options) {
-  const RegionSettings settings = options.region.resolved();
   Map map = load_map(options.map);
+  const RegionSettings settings = options.region.resolved(map);
   use_properties(map, options.properties);
   const Contact contact = find_contact(map, point_of(options.at), settings);
   const std::optional<ViewMask> view = options.region.view();

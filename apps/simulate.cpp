@@ -192,7 +192,9 @@ void add_simulate(CLI::App& app) {
       ->capture_default_str();
   command.add_option("--properties", o.properties,
                      "What touches measure (YAML); without it the friction of eight materials");
-  command.add_option("--seed", o.seed, "Everything random is a function of it")->capture_default_str();
+  command.add_option("--seed", o.seed, "Everything random is a function of it")
+      ->check(at_least_zero())
+      ->capture_default_str();
   command.add_option("--depth-scale", o.depth_scale, "Depth images hold metres times this")
       ->check(CLI::Range(1.0, 65535.0))
       ->capture_default_str();

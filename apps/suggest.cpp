@@ -7,6 +7,7 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
+#include "apps/run_settings.h"
 #include "apps/touch_options.h"
 #include "io/map_file/map_file.h"
 #include "mapping/touch/touch_suggestion.h"
@@ -49,6 +50,7 @@ int run_suggest(const SuggestOptions& options) {
   use_properties(map, options.properties);
   SuggestionSettings settings = options.settings;
   settings.region.rule = rule_of_name(options.rule);
+  settings.region.min_weight = least_observed_weight(map);
   const std::vector<Suggestion> suggestions = suggest_touches(map, options.property, settings);
   json all = json::array();
   for (const Suggestion& s : suggestions) all.push_back(suggestion_json(map, s));

@@ -1,4 +1,6 @@
-#include <cmath>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
@@ -9,6 +11,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/number_checks.h"
 #include "apps/output_files.h"
 #include "apps/touch_options.h"
 #include "inference/decision.h"
@@ -53,8 +56,6 @@ std::optional<OpenedSequence> open_touched(const TouchOptions& options) {
 /// The rows of the file, or the one touch that the command line gives by frame and pixel.
 std::vector<RecordedTouch> recorded_touches(const TouchOptions& options) {
   if (!options.file.empty()) return read_touches(options.file);
-  if (options.sequence.empty() || options.pixel.size() != 2)
-    throw TouchError("touch: expected --sequence and --pixel with --frame, found not all of them");
   RecordedTouch touch;
   touch.frame = options.frame;
   touch.pixel = Eigen::Vector2d(options.pixel[0], options.pixel[1]);
@@ -143,7 +144,21 @@ int list_touches(const TouchOptions& options) {
   return kDone;
 }
 
-TouchRequest request_of(const TouchOptions& options) {
+/// How many of these touches the journal holds twice: the same reading at the same place and time.
+size_t repeated(const Map& map, const std::vector<TouchEffect>& effects) {
+  const auto same = [](const TouchRequest& a, const TouchRequest& b) {
+    return a.stamp_s == b.stamp_s && a.point_m == b.point_m && a.property == b.property && a.value == b.value &&
+           a.sigma == b.sigma;
+  };
+  return size_t(std::count_if(effects.begin(), effects.end(), [&](const TouchEffect& effect) {
+    const TouchRequest& request = map.touches.find(effect.id)->request;
+    return std::any_of(map.touches.touches.begin(), map.touches.touches.end(), [&](const Touch& other) {
+      return other.id != effect.id && !other.undone && same(other.request, request);
+    });
+  }));
+}
+
+TouchRequest request_of(const TouchOptions& options, const Map& map) {
   TouchRequest request;
   request.stamp_s = options.stamp_s;
   if (!options.at.empty()) request.point_m = point_of(options.at);
@@ -152,23 +167,19 @@ TouchRequest request_of(const TouchOptions& options) {
   request.sigma = options.sigma;
   request.model = model_of_name(options.model);
   request.projection = projection_of_name(options.projection);
-  if (options.rho) {
-    if (!std::isfinite(*options.rho))
-      throw TouchError(describe_mismatch("--rho", "correlation", "a number from 0 to below 1", "another"));
-    request.rho = *options.rho;
-  }
-  request.region = options.region.resolved();
+  if (options.rho) request.rho = *options.rho;
+  request.region = options.region.resolved(map);
   return request;
 }
 
 int run_touch(const TouchOptions& options) {
   if (options.list) return list_touches(options);
-  const TouchRequest request = request_of(options);
   const std::string& out_file = options.out.empty() ? options.map : options.out;
   std::optional<MapWriting> writing;
   if (!options.dry_run) writing.emplace(out_file);
   Map map = load_map(options.map);
   use_properties(map, options.properties);
+  const TouchRequest request = request_of(options, map);
   json out;
   out["map"] = options.map;
   out["dry_run"] = options.dry_run;
@@ -185,7 +196,6 @@ int run_touch(const TouchOptions& options) {
             : undo          ? ": undone"
                             : ": redone");
   } else if (!options.file.empty() || options.frame) {
-    out["touches"] = json::array();
     const std::optional<OpenedSequence> opened = open_touched(options);
     const std::vector<RecordedTouch> touches = recorded_touches(options);
     for (const TouchOutcome& outcome :
@@ -196,7 +206,6 @@ int run_touch(const TouchOptions& options) {
         code = kInputOutput;
         std::fprintf(stderr, "feltmap: error: %s: %s\n", where.c_str(), outcome.refused.c_str());
       } else {
-        out["touches"].push_back(effect_json(map, *outcome.effect, request.region));
         effects.push_back(*outcome.effect);
       }
     }
@@ -209,12 +218,19 @@ int run_touch(const TouchOptions& options) {
   } else {
     const std::optional<ViewMask> view = options.region.view();
     effects.push_back(apply_touch(map, resolve_touch(map, request, view ? &*view : nullptr)));
-    out.update(effect_json(map, effects.back(), request.region));
   }
   if (!options.dry_run && !options.out.empty()) require_nothing_lost(options.out, map, false, options.force);
   out["map_hash"] = options.dry_run ? map_hash(map) : save_map(map, out_file);
+  if (const size_t twice = repeated(map, effects); twice > 0)
+    spdlog::warn("{} of {} touches repeat one that counts already (reading, place and time): they count twice", twice,
+                 effects.size());
   // Only what is done is said to be.
   if (options.json) {
+    if (!options.at.empty()) out.update(effect_json(map, effects.front(), request.region));
+    if (!options.file.empty() || options.frame) {
+      out["touches"] = json::array();
+      for (const TouchEffect& effect : effects) out["touches"].push_back(effect_json(map, effect, request.region));
+    }
     print_json(out);
   } else if (!options.quiet) {
     if (!said.empty()) std::printf("%s\n", said.c_str());
@@ -244,14 +260,13 @@ void add_touch(CLI::App& app) {
   CLI::Option* file = what.add_option("--file", options->file, "Recorded touches (CSV): all of them, or none");
   CLI::Option* frame =
       what.add_option("--frame", options->frame, "Number of the frame of --sequence in which --pixel was touched");
-  what.add_option("--undo", options->undo, "Take back the touch with this id");
-  what.add_option("--redo", options->redo, "Let an undone touch count again");
-  what.add_flag("--list", options->list, "Show the journal: every touch with what was believed before and after");
+  CLI::Option* undo = what.add_option("--undo", options->undo, "Take back the touch with this id");
+  CLI::Option* redo = what.add_option("--redo", options->redo, "Let an undone touch count again");
+  CLI::Option* list =
+      what.add_flag("--list", options->list, "Show the journal: every touch with what was believed before and after");
   CLI::Option* property = command.add_option("--property", options->property, "What was measured");
   CLI::Option* value = command.add_option("--value", options->value, "The reading, in the property's unit");
-  at->needs(property)->needs(value);
-  file->excludes(property)->excludes(value);
-  frame->needs(property)->needs(value);
+  value->check(finite());
   CLI::Option* sequence = command.add_option("--sequence", options->sequence,
                                              "Recording that --frame, or rows of --file with u and v, speak of");
   CLI::Option* pixel = command.add_option("--pixel", options->pixel,
@@ -261,25 +276,37 @@ void add_touch(CLI::App& app) {
       command.add_option("--masks", options->masks, "Folder of instance images or masks to take that segment from");
   masks->needs(sequence);
   CLI::Option* sigma = command.add_option("--sigma", options->sigma, "Standard deviation of the reading's noise");
-  sigma->capture_default_str();
+  sigma->check(at_least_zero())->capture_default_str();
   CLI::Option* stamp = command.add_option("--stamp", options->stamp_s, "Time of the touch, seconds");
-  stamp->capture_default_str();
-  at->excludes(sequence);
+  stamp->check(finite())->capture_default_str();
+  CLI::Option* model =
+      command
+          .add_option("--model", options->model, "material: the region is one material; mixture: each voxel its own")
+          ->check(CLI::IsMember({"material", "mixture"}))
+          ->capture_default_str();
+  CLI::Option* projection = command.add_option("--projection", options->projection, "kl or published")
+                                ->check(CLI::IsMember({"kl", "published"}))
+                                ->capture_default_str();
+  CLI::Option* rho =
+      command.add_option("--rho", options->rho, "Correlation of readings within a region, instead of the property's")
+          ->check(from_zero_to_below(1));
+  CLI::Option* properties =
+      command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
+  CLI::Option* out = command.add_option("--out", options->out, "Write here instead of in place");
+  CLI::Option* force =
+      command.add_flag("--force", options->force, "Let --out replace a file that is no map of the same frames");
+  CLI::Option* dry_run = command.add_flag("--dry-run", options->dry_run, "Say what would change and write nothing");
+
+  at->needs(property)->needs(value)->excludes(sequence);
+  frame->needs(property)->needs(value)->needs(sequence)->needs(pixel)->excludes(stamp);
   // Rows have a property, value, noise and time of their own, a frame its recorded time.
-  file->excludes(sigma)->excludes(stamp);
-  frame->excludes(stamp);
-  command.add_option("--model", options->model, "material: the region is one material; mixture: each voxel its own")
-      ->check(CLI::IsMember({"material", "mixture"}))
-      ->capture_default_str();
-  command.add_option("--projection", options->projection, "kl or published")
-      ->check(CLI::IsMember({"kl", "published"}))
-      ->capture_default_str();
-  command.add_option("--rho", options->rho, "Correlation of readings within a region, instead of the property's");
-  command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
-  command.add_option("--out", options->out, "Write here instead of in place");
-  command.add_flag("--force", options->force, "Let --out replace a file that is no map of the same frames");
-  command.add_flag("--dry-run", options->dry_run, "Say what would change and write nothing");
-  options->region.add_to(command);
+  file->excludes(property)->excludes(value)->excludes(sigma)->excludes(stamp);
+  std::vector<CLI::Option*> of_a_reading = options->region.add_to(command);
+  of_a_reading.insert(of_a_reading.end(),
+                      {property, value, sequence, pixel, masks, sigma, stamp, model, projection, rho, properties});
+  for (CLI::Option* of_the_journal : {undo, redo, list})
+    for (CLI::Option* option : of_a_reading) of_the_journal->excludes(option);
+  list->excludes(out)->excludes(force)->excludes(dry_run);
 }
 
 }  // namespace felt::apps

@@ -5,6 +5,8 @@
 #include <sstream>
 #include <utility>
 
+#include "apps/number_checks.h"
+#include "apps/run_settings.h"
 #include "core/error.h"
 #include "inference/decision.h"
 #include "io/readings/mask_image.h"
@@ -77,41 +79,48 @@ Eigen::Vector3d point_of(const std::string& text) {
   return {numbers->at(0), numbers->at(1), numbers->at(2)};
 }
 
-void RegionOptions::add_to(CLI::App& command) {
-  command
-      .add_option("--region", rule, "connected, mask, sphere, instance: the thing touched, or segment of the whole map")
+std::vector<CLI::Option*> RegionOptions::add_to(CLI::App& command) {
+  std::vector<CLI::Option*> added;
+  const auto add = [&](const char* name, auto& value, const char* text) {
+    return added.emplace_back(command.add_option(name, value, text));
+  };
+  add("--region", rule, "connected, mask, sphere, instance: the thing touched, or segment of the whole map")
       ->check(CLI::IsMember({"connected", "mask", "sphere", "instance", "segment"}))
       ->capture_default_str();
-  command.add_option("--radius", settings.radius_m, "Limit in metres: along the surface, or of the sphere");
-  command.add_option("--snap", settings.snap_voxels, "How far the surface may be from the point, voxels")
+  add("--radius", settings.radius_m, "Limit in metres: along the surface, or of the sphere")->check(above_zero());
+  add("--snap", settings.snap_voxels, "How far the surface may be from the point, voxels")
+      ->check(within(0, 64))
       ->capture_default_str();
-  command.add_option("--band", settings.band_voxels, "Half width of the surface band, voxels")->capture_default_str();
-  command.add_option("--min-weight", settings.min_weight, "Observation weight of an observed voxel")
+  add("--band", settings.band_voxels, "Half width of the surface band, voxels")
+      ->check(above_zero_up_to(8))
       ->capture_default_str();
-  command
-      .add_option("--class-ratio", settings.class_ratio,
-                  "Least belief in the contact's class against the voxel's strongest, 0 to 1")
+  add("--min-weight", min_weight,
+      "Observation weight of an observed voxel [1; any, where the weight of frames depends on depth]")
+      ->check(above_zero());
+  add("--class-ratio", settings.class_ratio, "Least belief in the contact's class against the voxel's strongest")
+      ->check(within(0, 1))
       ->capture_default_str();
-  command
-      .add_option("--normal-change", settings.normal_change_deg,
-                  "Largest angle between neighbours, degrees; noisy surfaces raise it, to 30 at most")
+  add("--normal-change", settings.normal_change_deg,
+      "Largest angle between neighbours, degrees; noisy surfaces raise it, to 30 at most")
+      ->check(above_zero_up_to(180))
       ->capture_default_str();
-  command.add_option(
-      "--color-change", settings.color_change,
-      "Largest difference from the contact's colour, grey levels; with --region segment between neighbours, "
-      "CIE Lab");
-  command.add_option("--mask", mask, "Image whose non-zero pixels belong to the region (with --region mask)");
-  command.add_option("--intrinsics", intrinsics, "Camera of the mask: fx,fy,cx,cy or fx,fy,cx,cy,width,height")
+  add("--color-change", settings.color_change,
+      "Largest difference from the contact's colour, grey levels; with --region segment between neighbours, CIE Lab")
+      ->check(at_least_zero());
+  add("--mask", mask, "Image whose non-zero pixels belong to the region (with --region mask)");
+  add("--intrinsics", intrinsics, "Camera of the mask: fx,fy,cx,cy or fx,fy,cx,cy,width,height")
       ->delimiter(',')
       ->expected(4, 6);
-  command.add_option("--pose", pose, "Camera to world of the mask: 16 numbers row by row")
-      ->delimiter(',')
-      ->expected(16);
+  add("--pose", pose, "Camera to world of the mask: 16 numbers row by row")->delimiter(',')->expected(16);
+  return added;
 }
 
-RegionSettings RegionOptions::resolved() const {
+RegionSettings RegionOptions::resolved(const Map& map) const {
   RegionSettings out = settings;
+  out.min_weight = min_weight ? *min_weight : least_observed_weight(map);
   out.rule = rule_of_name(rule);
+  if (out.rule == RegionRule::sphere && !std::isfinite(out.radius_m))
+    throw ConfigError("--region sphere: expected --radius, found none");
   validate(out);
   return out;
 }
@@ -121,7 +130,7 @@ std::optional<ViewMask> RegionOptions::view() const {
     throw ConfigError(describe_mismatch("--mask, --intrinsics, --pose", "region", "--region mask", "--region " + rule));
   if (rule != "mask") return std::nullopt;
   if (mask.empty() || (intrinsics.size() != 4 && intrinsics.size() != 6) || pose.size() != 16)
-    throw TouchError("region mask: expected --mask, --intrinsics and --pose, found not all of them");
+    throw ConfigError("--region mask: expected --mask, --intrinsics and --pose, found not all of them");
   return read_view_mask(mask, intrinsics, pose);
 }
 

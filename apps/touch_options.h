@@ -20,13 +20,15 @@ Eigen::Vector3d point_of(const std::string& text);
 /// Options that say which voxels a touch speaks for, shared by `touch` and `region`.
 struct RegionOptions {
   RegionSettings settings;
+  std::optional<double> min_weight;
   std::string rule = "connected";
   std::string mask;                ///< picture of the rule `mask`
   std::vector<double> intrinsics;  ///< fx, fy, cx, cy
   std::vector<double> pose;        ///< 16 numbers, camera to world, row by row
 
-  void add_to(CLI::App& command);
-  RegionSettings resolved() const;
+  /// Adds the options, and returns them.
+  std::vector<CLI::Option*> add_to(CLI::App& command);
+  RegionSettings resolved(const Map& map) const;
   /// The mask with its camera where the rule is `mask`.
   std::optional<ViewMask> view() const;
 };

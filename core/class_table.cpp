@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "core/error.h"
+#include "core/image.h"
 #include "core/utf8.h"
 
 namespace felt {
@@ -25,14 +27,18 @@ ClassTable::ClassTable(std::vector<ClassInfo> classes) : classes_(std::move(clas
     if (const auto [other, is_new] = by_name.emplace(c.name, c.id); !is_new)
       problems.push_back("class table: name '" + c.name + "': expected unique names, found it for ids " +
                          std::to_string(other->second) + " and " + std::to_string(c.id));
+    if (c.id == kNoLabel)
+      problems.push_back(describe_mismatch("class table", "id of '" + c.name + "'",
+                                           "one below 65535, which means no label in images", "65535"));
     if (c.id >= slot_of_id_.size()) {
       slot_of_id_.resize(c.id + 1, kNoSlot);
       known_.resize(c.id + 1, false);
     }
     known_[c.id] = true;
-    if (c.prior && (!(*c.prior > 0) || !std::isfinite(*c.prior)))
-      problems.push_back("class table: prior of '" + c.name + "': expected a number above 0, found " +
-                         std::to_string(*c.prior));
+    constexpr double kLargestPrior = 1e6;  // sums are kept in floats
+    if (c.prior && !(*c.prior > 0 && *c.prior <= kLargestPrior))
+      problems.push_back(describe_mismatch("class table", "prior of '" + c.name + "'", "a number above 0, up to 1e6",
+                                           std::to_string(*c.prior)));
     if (!c.ignore) {
       slot_of_id_[c.id] = uint16_t(by_slot_.size());
       by_slot_.push_back(uint32_t(row));
@@ -41,6 +47,10 @@ ClassTable::ClassTable(std::vector<ClassInfo> classes) : classes_(std::move(clas
   if (by_slot_.empty() && problems.empty())
     problems.push_back("class table: classes: expected at least one class that is not ignored, found none of " +
                        std::to_string(classes_.size()));
+  // Views keep slots in 16 bits, -1 for none.
+  if (by_slot_.size() > size_t(std::numeric_limits<int16_t>::max()))
+    problems.push_back(describe_mismatch("class table", "classes", "at most 32767 that are not ignored",
+                                         std::to_string(by_slot_.size())));
   if (!problems.empty()) throw ConfigError(problems);
   for (int slot = 0; slot < size(); ++slot) {
     prior_total_ += prior(slot);

@@ -42,16 +42,20 @@ PropertyTable::PropertyTable(std::vector<Property> properties) : properties_(std
     expect(p.support_lo < p.support_hi, where, "support", "lo < hi",
            number(p.support_lo) + " and " + number(p.support_hi));
     expect(p.rho >= 0 && p.rho < 1, where, "rho", "0 <= rho < 1", number(p.rho));
-    expect(std::isfinite(p.max_prior_readings) && p.max_prior_readings > 0, where, "max_prior_readings",
-           "a positive number", number(p.max_prior_readings));
+    expect(std::isfinite(p.max_prior_readings) && p.max_prior_readings >= 1e-6, where, "max_prior_readings",
+           "a number of at least 1e-6", number(p.max_prior_readings));
     for (const auto& [class_name, prior] : p.priors) {
       const std::string row = where + ", class '" + class_name + "'";
       expect(is_utf8(class_name), where, "names of classes", "UTF-8", "other bytes");
-      expect(std::isfinite(prior.mean) && prior.mean >= p.support_lo && prior.mean <= p.support_hi, row, "mean",
-             "a number in the support", number(prior.mean));
-      expect(std::isfinite(prior.sd) && prior.sd > 0, row, "sd", "a positive number", number(prior.sd));
-      expect(std::isfinite(prior.readings) && prior.readings > 0, row, "readings", "a positive number",
-             number(prior.readings));
+      // Squares of all of them, and their products, must be numbers.
+      constexpr double kLargest = 1e15, kFewestReadings = 1e-6;
+      expect(prior.mean >= p.support_lo && prior.mean <= p.support_hi, row, "mean", "a number in the support",
+             number(prior.mean));
+      expect(std::abs(prior.mean) <= kLargest, row, "mean", "a number of size up to 1e15", number(prior.mean));
+      expect(prior.sd >= 1 / kLargest && prior.sd <= kLargest, row, "sd", "a number from 1e-15 to 1e15",
+             number(prior.sd));
+      expect(std::isfinite(prior.readings) && prior.readings >= kFewestReadings, row, "readings",
+             "a number of at least 1e-6", number(prior.readings));
     }
   }
   if (!problems.empty()) throw ConfigError(problems);

@@ -125,7 +125,8 @@ private:
     const V v = pair::Div(p.gamma, p.beta);
     const V predictive = pair::Add(pair::Add(v, pair::Div(v, p.kappa)), noise_variance_);
     const V tail = pair::Add(constant(1.0f), pair::Div(pair::Mul(d, d), predictive));
-    return pair::Lt(v, pair::Mul(pair::Mul(constant(3.001f), noise_variance_), pair::Mul(tail, tail)));
+    const M tail_counts = pair::Lt(v, pair::Mul(pair::Mul(constant(3.001f), noise_variance_), pair::Mul(tail, tail)));
+    return pair::Or(tail_counts, pair::Lt(p.beta, constant(1.5f)));
   }
 
   HWY_INLINE void read_as_each_class(size_t voxel) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -10,7 +11,7 @@ namespace felt {
 namespace {
 
 using Rule = boost::math::quadrature::gauss_kronrod<double, 15>;
-constexpr double kTolerance = 1e-9;
+constexpr double kTolerance = 1e-11;  // of the whole integral, for one panel
 constexpr int kMaxDepth = 12;
 // Weights below this change no result; their components need no points of their own.
 constexpr double kNegligibleWeight = 1e-12;
@@ -40,33 +41,61 @@ Support support_of(const StudentTMixture& m) {
   return s;
 }
 
+Estimate one_panel(const std::function<double(double)>& g, double from, double to) {
+  Estimate panel;
+  panel.value = Rule::integrate(g, from, to, 0, 0.0, &panel.error);
+  return panel;
+}
+
+// Halves a panel as long as its error is above `tolerance`. Absolute: a panel across which the integrand changes sign,
+// or that holds next to nothing, would never reach a share of its own integral.
+Estimate refined(const std::function<double(double)>& g, double from, double to, const Estimate& panel,
+                 double tolerance, int depth) {
+  if (!(panel.error > tolerance) || depth == 0) return panel;
+  const double middle = from + (to - from) / 2;
+  const Estimate left = refined(g, from, middle, one_panel(g, from, middle), tolerance / 2, depth - 1);
+  const Estimate right = refined(g, middle, to, one_panel(g, middle, to), tolerance / 2, depth - 1);
+  return {left.value + right.value, left.error + right.error};
+}
+
 // Integral over the real line of f(x), which decays as the mixture's density does (times a logarithm).
-template <class F>
-Estimate integrate(const StudentTMixture& m, F f) {
+Estimate integrate(const StudentTMixture& m, const std::function<double(double)>& f) {
   const Support s = support_of(m);
-  Estimate total;
-  const auto add = [&](auto g, double from, double to) {
-    double error = 0;
-    const double value = Rule::integrate(g, from, to, kMaxDepth, kTolerance, &error);
-    total.value += value;
-    // The rule's own estimate is the difference to its embedded Gauss rule; rounding comes on top.
-    total.error += error + 1e-15 * std::abs(value);
+  struct Panel {
+    std::function<double(double)> g;
+    double from = 0, to = 0;
+    Estimate first;
+  };
+  std::vector<Panel> panels;
+  double size = 0;
+  const auto add = [&](const std::function<double(double)>& g, double from, double to) {
+    panels.push_back({g, from, to, one_panel(g, from, to)});
+    size += std::abs(panels.back().first.value);
   };
   for (size_t i = 0; i + 1 < s.edge.size(); ++i) add(f, s.edge[i], s.edge[i + 1]);
 
   // Tails: x = end +- width (e^u - 1), where the integrand falls as e^(-dof u).
+  Estimate total;
   const double low = s.edge.front(), high = s.edge.back(), width = high - low;
   const double longest = std::log(std::numeric_limits<double>::max()) / 2 - std::max(0.0, std::log(width));
   const double reach = std::min(45 / s.lowest_dof + 5, std::max(longest, 5.0));
   for (double side : {-1.0, 1.0}) {
     const double end = side < 0 ? low : high;
-    const auto tail = [&](double u) { return f(end + side * width * std::expm1(u)) * width * std::exp(u); };
+    const auto tail = [&f, end, side, width](double u) {
+      return f(end + side * width * std::expm1(u)) * width * std::exp(u);
+    };
     double step = 0.5;
     for (double u = 0; u < reach; u += step, step = std::min(1.25 * step, 4 / s.lowest_dof + 1)) {
       add(tail, u, std::min(u + step, reach));
     }
     // What lies beyond: the last value times the decay length.
     total.error += std::abs(tail(reach)) / s.lowest_dof;
+  }
+  for (const Panel& p : panels) {
+    const Estimate panel = refined(p.g, p.from, p.to, p.first, kTolerance * size, kMaxDepth);
+    total.value += panel.value;
+    // The rule's own estimate is the difference to its embedded Gauss rule; rounding comes on top.
+    total.error += panel.error + 1e-15 * std::abs(panel.value);
   }
   return total;
 }

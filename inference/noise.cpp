@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <vector>
 
 #include "inference/special_functions.h"
@@ -18,11 +19,38 @@ using Rule = boost::math::quadrature::gauss<double, 20>;
 // Panels whose integrand stays below e^-kNegligible of the largest are left out.
 constexpr double kNegligible = 45.0;
 
+// Readings with noise of one size, as an update sees them: about the prior location.
+struct EquallyNoisy {
+  double noise2 = 0, n = 0, mean = 0, m2 = 0;
+};
+
+std::vector<EquallyNoisy> by_noise(double tau, std::span<const double> psi, std::span<const double> noise_sd) {
+  std::vector<size_t> order(psi.size());
+  std::iota(order.begin(), order.end(), size_t(0));
+  std::stable_sort(order.begin(), order.end(), [&](size_t i, size_t j) { return noise_sd[i] < noise_sd[j]; });
+  std::vector<EquallyNoisy> groups;
+  for (size_t k = 0; k < order.size(); ++k) {
+    const size_t i = order[k];
+    if (k == 0 || noise_sd[i] != noise_sd[order[k - 1]]) groups.push_back({noise_sd[i] * noise_sd[i], 0, 0, 0});
+    EquallyNoisy& g = groups.back();
+    const double d = psi[i] - tau, step = d - g.mean;
+    g.n += 1;
+    g.mean += step / g.n;
+    g.m2 += step * (d - g.mean);
+  }
+  return groups;
+}
+
 // One class, several noisy readings, as a function of t = ln(lambda / (beta/gamma)).
 class PrecisionPosterior {
 public:
   PrecisionPosterior(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd, double rho)
-      : prior_(prior), psi_(psi), noise_sd_(noise_sd), rho_(rho), plug_in_precision_(prior.beta / prior.gamma) {
+      : prior_(prior),
+        psi_(psi),
+        noise_sd_(noise_sd),
+        readings_(by_noise(prior.tau, psi, noise_sd)),
+        rho_(rho),
+        plug_in_precision_(prior.beta / prior.gamma) {
     // Gamma(lambda; beta, gamma) d lambda = exp(constant + beta (t - e^t)) dt
     log_normaliser_ = prior.beta * std::log(prior.beta) - boost::math::lgamma(prior.beta) -
                       0.5 * double(psi.size()) * std::log(2 * std::numbers::pi);
@@ -41,19 +69,19 @@ public:
   Given at(double t) const {
     Given g;
     g.lambda = plug_in_precision_ * std::exp(t);
-    const double sigma2 = 1 / g.lambda;
+    const double sigma2 = 1 / g.lambda, unshared = (1 - rho_) * sigma2;
     double precision = 0, weighted = 0, log_determinant = 0;
-    for (size_t i = 0; i < psi_.size(); ++i) {
-      const double own = (1 - rho_) * sigma2 + noise_sd_[i] * noise_sd_[i];
-      precision += 1 / own;
-      weighted += (psi_[i] - prior_.tau) / own;
-      log_determinant += std::log(own);
+    for (const EquallyNoisy& r : readings_) {
+      const double own = unshared + r.noise2;
+      precision += r.n / own;
+      weighted += r.n * r.mean / own;
+      log_determinant += r.n * std::log(own);
     }
     const double mean = weighted / precision;
     double squares = 0;
-    for (size_t i = 0; i < psi_.size(); ++i) {
-      const double d = psi_[i] - prior_.tau - mean;
-      squares += d * d / ((1 - rho_) * sigma2 + noise_sd_[i] * noise_sd_[i]);
+    for (const EquallyNoisy& r : readings_) {
+      const double d = r.mean - mean;
+      squares += (r.m2 + r.n * d * d) / (unshared + r.noise2);
     }
     const double common = (rho_ + 1 / prior_.kappa) * sigma2;
     squares += mean * mean * precision / (1 + common * precision);
@@ -84,6 +112,7 @@ public:
 private:
   Nig prior_;
   std::span<const double> psi_, noise_sd_;
+  std::vector<EquallyNoisy> readings_;
   double rho_, plug_in_precision_, log_normaliser_ = 0;
 };
 
@@ -136,6 +165,18 @@ void for_each_node(const PrecisionPosterior& posterior, const Panels& panels, F 
   }
 }
 
+// Weighted mean and sum of squares about it, in one pass.
+struct Spread {
+  double weight = 0, mean = 0, squares = 0;
+  void add(double w, double x) {
+    if (w == 0) return;
+    weight += w;
+    const double d = x - mean;
+    mean += d * w / weight;
+    squares += w * d * (x - mean);
+  }
+};
+
 }  // namespace
 
 MaterialClass tempered_material_class(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd,
@@ -183,39 +224,33 @@ MaterialClass quadrature_material_class(const Nig& prior, std::span<const double
   assert(!psi.empty() && psi.size() == noise_sd.size());
   const PrecisionPosterior posterior(prior, psi, noise_sd, rho);
   const Panels panels = choose_panels(posterior);
-  double mass = 0, precision = 0, log_precision = 0, shift = 0, region = 0;
+  double mass = 0, precision = 0, log_precision = 0, mean_variance = 0, region_variance = 0;
+  Spread shift, region;
   for_each_node(posterior, panels, [&](double w, const PrecisionPosterior::Given& g) {
+    const double by_precision = w * g.lambda;
     mass += w;
-    precision += w * g.lambda;
+    precision += by_precision;
     log_precision += w * std::log(g.lambda / posterior.plug_in_precision());
-    shift += w * g.lambda * g.mean_shift;
-    region += w * g.lambda * g.region_shift;
+    shift.add(by_precision, g.mean_shift);
+    region.add(by_precision, g.region_shift);
+    mean_variance += by_precision * g.mean_variance;
+    region_variance += by_precision * g.region_variance;
   });
-  shift /= precision;
-  region /= precision;
-  double inverse_kappa = 0, next_spread = 0;
-  for_each_node(posterior, panels, [&](double w, const PrecisionPosterior::Given& g) {
-    const double d = g.mean_shift - shift, e = g.region_shift - region;
-    inverse_kappa += w * g.lambda * (g.mean_variance + d * d);
-    next_spread += w * g.lambda * (g.region_variance + e * e);
-  });
+  const double inverse_kappa = mean_variance + shift.squares, next_spread = region_variance + region.squares;
   precision /= mass;
   const double beta =
       inverse_log_minus_digamma(std::log(precision / posterior.plug_in_precision()) - log_precision / mass);
-  const Nig nig{prior.tau + shift, mass / inverse_kappa, beta, beta / precision};
+  const Nig nig{prior.tau + shift.mean, mass / inverse_kappa, beta, beta / precision};
   return {panels.peak + std::log(mass),
           nig,
-          {prior.tau + region, plug_in_variance(nig) * (1 - rho + next_spread / mass), 2 * beta}};
+          {prior.tau + region.mean, plug_in_variance(nig) * (1 - rho + next_spread / mass), 2 * beta}};
 }
 
-bool needs_quadrature(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd, double rho) {
-  const double v = plug_in_variance(prior), unshared = v * (psi.size() == 1 ? 1 : 1 - rho);
-  for (size_t i = 0; i < psi.size(); ++i) {
-    const double noise2 = noise_sd[i] * noise_sd[i], d = psi[i] - prior.tau;
-    const double z2 = d * d / (v * (1 + 1 / prior.kappa) + noise2);
-    if (noise2 * (1 + z2) * (1 + z2) > unshared / 3) return true;
-  }
-  return false;
+bool needs_quadrature(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd) {
+  if (psi.size() > 1 || prior.beta < 1.5) return true;
+  const double v = plug_in_variance(prior), noise2 = noise_sd[0] * noise_sd[0], d = psi[0] - prior.tau;
+  const double z2 = d * d / (v * (1 + 1 / prior.kappa) + noise2);
+  return noise2 * (1 + z2) * (1 + z2) > v / 3;
 }
 
 MaterialClass noisy_material_class(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd,
@@ -223,12 +258,11 @@ MaterialClass noisy_material_class(const Nig& prior, std::span<const double> psi
   if (std::all_of(noise_sd.begin(), noise_sd.end(), [](double s) { return s == 0; })) {
     return material_class(prior, statistics_of(psi), rho);
   }
-  // Such a prior knows its precision to a thousandth: readings are Gaussian, for which tempering is exact, and the
-  // density over the precision is too narrow for panels.
+  // Such a prior knows its precision to a thousandth: readings are Gaussian, for which tempering is exact as long as
+  // none lies hundreds of spreads away, and the density over the precision is too narrow for panels.
   constexpr double kKnownPrecision = 1e6;
-  const auto by = prior.beta <= kKnownPrecision && needs_quadrature(prior, psi, noise_sd, rho)
-                      ? quadrature_material_class
-                      : tempered_material_class;
+  const auto by = prior.beta <= kKnownPrecision && needs_quadrature(prior, psi, noise_sd) ? quadrature_material_class
+                                                                                          : tempered_material_class;
   return by(prior, psi, noise_sd, rho);
 }
 

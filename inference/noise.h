@@ -17,10 +17,11 @@ struct NoisyReading {
   Nig posterior;
 };
 
-/// Whether the closed form may err by more than 0.03 nat in the log evidence: where noise_sd^2 (1 + z^2)^2 > v/3 for
-/// some reading, z its distance from tau in predictive standard deviations. Always so above noise_sd^2 = v/3, and in
-/// the tails earlier. Of several readings v counts only as far as they do not share it: v (1 - rho).
-bool needs_quadrature(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd, double rho);
+/// Whether the closed form may err by more than 0.03 nat in the log evidence. Of one reading: where
+/// noise_sd^2 (1 + z^2)^2 > v/3, z its distance from tau in predictive standard deviations; always so above
+/// noise_sd^2 = v/3, in the tails earlier, and where the prior stands for less than three readings (beta < 1.5). Always
+/// of several readings, whose errors add up.
+bool needs_quadrature(const Nig& prior, std::span<const double> psi, std::span<const double> noise_sd);
 
 /// The update to use: exact without noise, else quadrature where it is needed and the closed form elsewhere.
 NoisyReading noisy_update(const Nig& prior, double psi, double noise_sd);

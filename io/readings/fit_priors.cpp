@@ -60,15 +60,15 @@ std::vector<ClassReadings> read_readings_csv(const std::filesystem::path& file) 
   return classes;
 }
 
-PropertyTable fitted_properties(const std::vector<ClassReadings>& classes, const std::string& name,
-                                const std::string& unit, double max_nu_0) {
-  Property property;
-  property.name = name;
-  property.unit = unit;
-  property.max_prior_readings = max_nu_0;
+PropertyTable fitted_properties(const std::vector<ClassReadings>& classes, Property property) {
   std::vector<PriorFit> fits;
   for (const ClassReadings& c : classes) {
-    const std::optional<PriorFit> fit = fit_prior(c.groups, max_nu_0);
+    for (const std::vector<double>& group : c.groups)
+      for (const double value : group)
+        if (value < property.support_lo || value > property.support_hi)
+          throw ConfigError(describe_mismatch("priors", "reading of '" + c.name + "'", "a value in the support",
+                                              std::to_string(value)));
+    const std::optional<PriorFit> fit = fit_prior(c.groups, property.max_prior_readings);
     if (!fit) continue;
     fits.push_back(*fit);
     property.priors[c.name] = {fit->mean, fit->sd, fit->effective_readings};

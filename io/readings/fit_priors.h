@@ -20,11 +20,11 @@ struct ClassReadings {
 /// IoError, or FormatError with path:line for a row that cannot be used.
 std::vector<ClassReadings> read_readings_csv(const std::filesystem::path& file);
 
-/// The fit as the property `name` of a `properties.yaml` (io/tables/property_yaml.h): mean and sd of every class that
-/// can be fitted, its effective readings, and the classes' common rho (0.5 where groups do not tell it). Throws
-/// ConfigError where no class can be fitted or the name is none.
-PropertyTable fitted_properties(const std::vector<ClassReadings>& classes, const std::string& name,
-                                const std::string& unit, double max_nu_0);
+/// The fit as a property of a `properties.yaml` (io/tables/property_yaml.h), whose name, unit, support and largest
+/// number of readings are given: mean and sd of every class that can be fitted, its effective readings, and the
+/// classes' common rho (0.5 where groups do not tell it). Throws ConfigError where no class can be fitted, a reading
+/// lies outside the support, or the name is none.
+PropertyTable fitted_properties(const std::vector<ClassReadings>& classes, Property property);
 
 /// The fit as one JSON document: `classes` (mean, sd, nu_0, rho, goodness of fit), `rho`, `confusion` (square table)
 /// and `inseparable` (pairs that one touch does not separate). A class that cannot be fitted carries `error`.

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -136,12 +137,149 @@ ForceLog read_force_log(const std::filesystem::path& file) {
   return parse_force_log(read_file_or_pipe(file), file.string());
 }
 
-FrictionReading friction_reading(const ForceLog& log, const FrictionSettings& settings) {
-  const auto text = [](double x) {
-    char buffer[32];
-    snprintf(buffer, sizeof buffer, "%g", x);
-    return std::string(buffer);
+namespace {
+
+std::string text(double x) {
+  char buffer[32];
+  snprintf(buffer, sizeof buffer, "%g", x);
+  return buffer;
+}
+
+/// Forces along the normal and across it, the first turned so that pressing counts.
+void project(const std::vector<Eigen::Vector3d>& force, const Eigen::Vector3d& normal, FrictionReading& out) {
+  out.normal_n.clear();
+  out.tangential_n.clear();
+  double pressed = 0;
+  for (const Eigen::Vector3d& f : force) {
+    out.normal_n.push_back(f.dot(normal));
+    out.tangential_n.push_back((f - f.dot(normal) * normal).norm());
+    pressed += out.normal_n.back();
+  }
+  // Sensors differ in whether they report the force on the surface or on the tool.
+  if (pressed < 0)
+    for (double& f : out.normal_n) f = -f;
+}
+
+/// The longest contact. Throws FormatError where there is none.
+void find_contact_in(FrictionReading& out, double contact_n) {
+  const double strongest = *std::max_element(out.normal_n.begin(), out.normal_n.end());
+  if (!(strongest > 1e-6))
+    throw FormatError(describe_mismatch("force log", "normal force", "some", "none along the given normal"));
+  std::tie(out.contact_begin, out.contact_end) =
+      longest_run(0, out.normal_n.size(), [&](size_t i) { return out.normal_n[i] >= contact_n; });
+  if (out.contact_end - out.contact_begin < kFewestSamples)
+    throw FormatError(describe_mismatch(
+        "force log", "contact",
+        "at least " + std::to_string(kFewestSamples) + " samples with a normal force of " + text(contact_n) + " N",
+        "at most " + text(strongest) + " N"));
+}
+
+/// What a sensor reads without contact, and how much it wavers: of samples that are `apart` from every contact.
+struct Idle {
+  Eigen::Vector3d offset_n = Eigen::Vector3d::Zero();
+  double wavers_n = 0;  ///< root mean square across the normal
+};
+
+std::optional<Idle> idle_of(const std::vector<Eigen::Vector3d>& force, const Eigen::Vector3d& normal,
+                            const FrictionReading& reading, double contact_n, size_t apart) {
+  std::vector<size_t> samples;
+  for (size_t i = 0; i < force.size(); ++i) {
+    const size_t from = i > apart ? i - apart : 0, to = std::min(force.size(), i + apart + 1);
+    if (std::all_of(reading.normal_n.begin() + std::ptrdiff_t(from), reading.normal_n.begin() + std::ptrdiff_t(to),
+                    [&](double f) { return f < contact_n; }))
+      samples.push_back(i);
+  }
+  if (samples.size() < kFewestSamples) return std::nullopt;
+  Idle idle;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const size_t i : samples) values.push_back(force[i][axis]);
+    idle.offset_n[axis] = median(std::move(values));
+  }
+  double squares = 0;
+  for (const size_t i : samples) {
+    const Eigen::Vector3d f = force[i] - idle.offset_n;
+    squares += (f - f.dot(normal) * normal).squaredNorm();
+  }
+  idle.wavers_n = std::sqrt(squares / double(samples.size()));
+  return idle;
+}
+
+/// The level near which, within a twentieth, most of these lie; of equals the highest.
+double commonest(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  double best = values.back();
+  size_t most = 0, last = 0;
+  for (size_t first = 0; first < values.size(); ++first) {
+    while (last < values.size() && values[last] <= values[first] * 1.1) ++last;
+    if (last - first >= most) most = last - first, best = values[first + (last - first) / 2];
+  }
+  return best;
+}
+
+/// Change over the samples [begin, end) of the line that fits them best.
+double trend(const std::vector<double>& values, size_t begin, size_t end) {
+  const double n = double(end - begin), middle = (n - 1) / 2;
+  double products = 0, squares = 0;
+  for (size_t i = begin; i < end; ++i) {
+    const double t = double(i - begin) - middle;
+    products += t * values[i];
+    squares += t * t;
+  }
+  return products / squares * (n - 1);
+}
+
+/// Samples [begin, end) of steady sliding, its ends left out, and the level it keeps.
+struct Slide {
+  size_t begin = 0, end = 0;
+};
+
+Slide slide_of(const FrictionReading& reading, size_t firm_begin, size_t firm_end, double wavers_n, size_t smear) {
+  const auto none = [](const std::string& found) {
+    throw FormatError(describe_mismatch(
+        "force log", "sliding", "at least " + std::to_string(kFewestSamples) + " samples of steady F_t/F_n in contact",
+        found));
   };
+  const std::vector<double>& ratio = reading.ratio;
+  std::vector<double> loaded;
+  const double highest =
+      *std::max_element(ratio.begin() + std::ptrdiff_t(firm_begin), ratio.begin() + std::ptrdiff_t(firm_end));
+  for (size_t i = firm_begin; i < firm_end; ++i)
+    if (ratio[i] >= 0.5 * highest) loaded.push_back(ratio[i]);
+  const double level = commonest(loaded);
+  if (!(level > 1e-6)) none("none");
+  std::vector<double> away;
+  for (const double r : loaded)
+    if (std::abs(r - level) <= 0.25 * level) away.push_back(std::abs(r - level));
+  const double within = std::clamp(3 * 1.4826 * median(away), 0.1 * level, 0.25 * level);
+  Slide slide;
+  std::tie(slide.begin, slide.end) =
+      longest_run(firm_begin, firm_end, [&](size_t i) { return std::abs(ratio[i] - level) <= within; });
+  // A ramp enters and leaves the band at its edges, a plateau at its level.
+  while (slide.begin < slide.end && ratio[slide.begin] < level) ++slide.begin;
+  while (slide.begin < slide.end && ratio[slide.end - 1] < level) --slide.end;
+  const auto long_enough = [&] { return slide.begin + kFewestSamples <= slide.end; };
+  if (!long_enough()) none("none");
+  // The plateau's ends still hold the break-away and the release, smeared by the filter.
+  const size_t margin = std::min((slide.end - slide.begin) / 8, smear);
+  slide.begin += margin;
+  slide.end -= margin;
+  if (!long_enough() || 20 * (slide.end - slide.begin) < firm_end - firm_begin)
+    none("at most " + std::to_string(slide.end - slide.begin) + " of " + std::to_string(firm_end - firm_begin));
+  if (const double change = std::abs(trend(ratio, slide.begin, slide.end)); change > within)
+    none("F_t/F_n that changes by " + text(change) + " about " + text(level) + ": loaded, but not sliding");
+  double tangential = 0;
+  for (size_t i = slide.begin; i < slide.end; ++i) tangential += reading.tangential_n[i];
+  tangential /= double(slide.end - slide.begin);
+  if (tangential < 3 * wavers_n)
+    none("a tangential force of " + text(tangential) + " N where the sensor wavers by " + text(wavers_n) +
+         " N without contact");
+  return slide;
+}
+
+}  // namespace
+
+FrictionReading friction_reading(const ForceLog& log, const FrictionSettings& settings) {
   const size_t n = log.time_s.size();
   const double length = settings.normal.norm();
   if (!(length > 0) || !std::isfinite(length))
@@ -152,60 +290,41 @@ FrictionReading friction_reading(const ForceLog& log, const FrictionSettings& se
   for (size_t i = 1; i < n; ++i) steps.push_back(log.time_s[i] - log.time_s[i - 1]);
   const double rate_hz = 1 / median(steps);
   if (!(settings.cutoff_hz > 0) || settings.cutoff_hz >= rate_hz / 2)
-    throw ConfigError(describe_mismatch(
-        "force log", "cut-off", "between 0 and half the rate of " + text(rate_hz) + " Hz", text(settings.cutoff_hz)));
+    throw ConfigError(describe_mismatch("--cutoff", "frequency",
+                                        "between 0 and half the rate of the log, " + text(rate_hz) + " Hz",
+                                        text(settings.cutoff_hz)));
 
   const Eigen::Vector3d normal = settings.normal / length;
-  std::vector<double> along[3];
-  for (const Eigen::Vector3d& force : log.force_n)
-    for (int axis = 0; axis < 3; ++axis) along[axis].push_back(force[axis]);
-  for (auto& samples : along) samples = low_pass_zero_phase(samples, rate_hz, settings.cutoff_hz);
+  std::vector<Eigen::Vector3d> force(n);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> samples;
+    for (const Eigen::Vector3d& f : log.force_n) samples.push_back(f[axis]);
+    samples = low_pass_zero_phase(samples, rate_hz, settings.cutoff_hz);
+    for (size_t i = 0; i < n; ++i) force[i][axis] = samples[i];
+  }
 
   FrictionReading out;
-  double pressed = 0;
-  for (size_t i = 0; i < n; ++i) {
-    const Eigen::Vector3d force(along[0][i], along[1][i], along[2][i]);
-    out.normal_n.push_back(force.dot(normal));
-    out.tangential_n.push_back((force - force.dot(normal) * normal).norm());
-    pressed += out.normal_n.back();
+  project(force, normal, out);
+  find_contact_in(out, settings.contact_n);
+  const auto smear = size_t(std::ceil(0.5 * rate_hz / settings.cutoff_hz));
+  const std::optional<Idle> idle = idle_of(force, normal, out, settings.contact_n, 2 * smear);
+  if (idle) {
+    out.offset_n = idle->offset_n;
+    for (Eigen::Vector3d& f : force) f -= out.offset_n;
+    project(force, normal, out);
+    find_contact_in(out, settings.contact_n);
   }
-  // Sensors differ in whether they report the force on the surface or on the tool.
-  if (pressed < 0)
-    for (double& f : out.normal_n) f = -f;
-  const double strongest = *std::max_element(out.normal_n.begin(), out.normal_n.end());
-  if (!(strongest > 1e-6))
-    throw FormatError(describe_mismatch("force log", "normal force", "some", "none along the given normal"));
-  std::tie(out.contact_begin, out.contact_end) =
-      longest_run(0, n, [&](size_t i) { return out.normal_n[i] >= settings.contact_n; });
-  if (out.contact_end - out.contact_begin < kFewestSamples)
-    throw FormatError(describe_mismatch("force log", "contact",
-                                        "at least " + std::to_string(kFewestSamples) +
-                                            " samples with a normal force of " + text(settings.contact_n) + " N",
-                                        "at most " + text(strongest) + " N"));
   out.ratio.assign(n, std::numeric_limits<double>::quiet_NaN());
   for (size_t i = out.contact_begin; i < out.contact_end; ++i) out.ratio[i] = out.tangential_n[i] / out.normal_n[i];
 
-  // Sliding: ratios near the level that most of the loaded contact keeps. Rise, release and the filter's ends fall out.
-  std::vector<double> loaded;
-  const double highest = *std::max_element(out.ratio.begin() + std::ptrdiff_t(out.contact_begin),
-                                           out.ratio.begin() + std::ptrdiff_t(out.contact_end));
-  for (size_t i = out.contact_begin; i < out.contact_end; ++i)
-    if (out.ratio[i] >= 0.5 * highest) loaded.push_back(out.ratio[i]);
-  const double level = median(loaded);
-  std::vector<double> away;
-  for (const double r : loaded) away.push_back(std::abs(r - level));
-  const double within = std::max(0.1 * level, 3 * 1.4826 * median(away));
-  std::tie(out.slide_begin, out.slide_end) = longest_run(
-      out.contact_begin, out.contact_end, [&](size_t i) { return std::abs(out.ratio[i] - level) <= within; });
-  if (out.slide_end - out.slide_begin < kFewestSamples || !(level > 1e-6))
-    throw FormatError(describe_mismatch(
-        "force log", "sliding", "at least " + std::to_string(kFewestSamples) + " samples of steady F_t/F_n in contact",
-        "none"));
-  // The plateau's ends still hold the break-away and the release, smeared by the filter.
-  const size_t margin =
-      std::min((out.slide_end - out.slide_begin) / 8, size_t(std::ceil(0.5 * rate_hz / settings.cutoff_hz)));
-  out.slide_begin += margin;
-  out.slide_end -= margin;
+  // Touch-down and lift-off divide by forces near zero: only where the contact is firm does the ratio mean something.
+  const auto at = [&](size_t i) { return out.normal_n.begin() + std::ptrdiff_t(i); };
+  const double firm_n = 0.5 * median({at(out.contact_begin), at(out.contact_end)});
+  const auto [firm_begin, firm_end] =
+      longest_run(out.contact_begin, out.contact_end, [&](size_t i) { return out.normal_n[i] >= firm_n; });
+  const Slide slide = slide_of(out, firm_begin, firm_end, idle ? idle->wavers_n : 0, smear);
+  out.slide_begin = slide.begin;
+  out.slide_end = slide.end;
   double sum = 0, squares = 0;
   const double count = double(out.slide_end - out.slide_begin);
   for (size_t i = out.slide_begin; i < out.slide_end; ++i) sum += out.ratio[i];
@@ -213,10 +332,9 @@ FrictionReading friction_reading(const ForceLog& log, const FrictionSettings& se
   for (size_t i = out.slide_begin; i < out.slide_end; ++i)
     squares += (out.ratio[i] - out.kinetic_mean) * (out.ratio[i] - out.kinetic_mean);
   out.kinetic_sd = std::sqrt(squares / (count - 1));
-  out.peak = out.contact_begin;
-  const double firm_n = 0.5 * median(out.normal_n);
-  for (size_t i = out.contact_begin; i < out.slide_end; ++i)
-    if (out.ratio[i] > out.ratio[out.peak] && out.normal_n[i] >= firm_n) out.peak = i;
+  out.peak = firm_begin;
+  for (size_t i = firm_begin; i <= out.slide_begin; ++i)
+    if (out.ratio[i] > out.ratio[out.peak]) out.peak = i;
   out.static_peak = out.ratio[out.peak];
   return out;
 }

@@ -32,6 +32,7 @@ struct FrictionReading {
   double static_peak = 0;                             ///< largest F_t/F_n before sliding
   double kinetic_mean = 0;                            ///< mean of F_t/F_n while sliding
   double kinetic_sd = 0;                              ///< standard deviation of the same
+  Eigen::Vector3d offset_n{0, 0, 0};                  ///< what the sensor reads without contact, taken off all forces
   size_t contact_begin = 0, contact_end = 0;          ///< samples [begin, end) of the longest contact
   size_t peak = 0;                                    ///< sample of the static peak
   size_t slide_begin = 0, slide_end = 0;              ///< samples of the kinetic plateau
@@ -42,10 +43,13 @@ struct FrictionReading {
 /// `rate_hz` apart. Ends are extended by odd reflection. `cutoff_hz` below half the rate.
 std::vector<double> low_pass_zero_phase(const std::vector<double>& samples, double rate_hz, double cutoff_hz);
 
-/// Normal and tangential force by projection on the normal, low-pass, longest contact with F_n >= contact_n, static
-/// peak (the highest ratio in the first part of the contact that it falls from or stays at), kinetic plateau (the
-/// longest run after it within a tenth, or three robust deviations, of its median). Throws FormatError: a normal or
-/// setting that is no number in range, no contact, no normal force, no sliding.
+/// Low-pass; what the sensor reads without contact taken off (where the log shows it); normal and tangential force by
+/// projection on the normal; longest contact with F_n >= contact_n, of which the ratio counts where F_n is at least
+/// half its median; kinetic plateau (the longest run within a tenth, or three robust deviations up to a quarter, of the
+/// ratio that most of the loaded contact keeps); static peak (the highest ratio before it). Throws ConfigError for a
+/// normal or setting that is no number in range, and FormatError where there is no contact, no normal force, or no
+/// sliding: no run, one that rises all along as a load on a foot that sticks does, or a tangential force that the
+/// sensor's noise explains.
 FrictionReading friction_reading(const ForceLog& log, const FrictionSettings& settings);
 
 /// Forces and their ratio over time with contact, peak and plateau marked.

@@ -208,17 +208,19 @@ std::vector<TouchOutcome> apply_recorded_touches(Map& map, const std::vector<Rec
                                                  const TouchRequest& defaults, const TouchedSequence* sequence) {
   std::vector<TouchOutcome> outcomes;
   const FusedSpan span = fused_span(map.frames);
+  TouchBatch batch(map);
   for (const RecordedTouch& touch : touches) {
     TouchOutcome outcome{touch, std::nullopt, ""};
     try {
       if (sequence == nullptr) require_recorded_within(span, touch);
       const Resolved asked = resolved(touch, defaults, sequence);
-      outcome.effect = apply_touch(map, resolve_touch(map, asked.request, asked.view ? &*asked.view : nullptr));
+      outcome.effect = batch.apply(resolve_touch(map, asked.request, asked.view ? &*asked.view : nullptr));
     } catch (const Error& error) {
       outcome.refused = error.what();
     }
     outcomes.push_back(std::move(outcome));
   }
+  batch.finish();
   return outcomes;
 }
 

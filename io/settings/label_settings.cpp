@@ -27,8 +27,11 @@ LabelSettings overlaid(LabelSettings first, const LabelSettings& second) {
 std::vector<std::string> problems_of(const LabelSettings& settings) {
   std::vector<std::string> problems;
   const auto expect = [&](const std::optional<double>& value, bool zero_is_fine, const char* option, const char* what) {
-    if (!value || (std::isfinite(*value) && (*value > 0 || (zero_is_fine && *value == 0)))) return;
-    problems.push_back(describe_mismatch(option, what, zero_is_fine ? "a number of at least 0" : "a number above 0",
+    // Sums of what is counted are 32-bit floats.
+    constexpr double kLargest = 1e6;
+    if (!value || ((*value > 0 || (zero_is_fine && *value == 0)) && *value <= kLargest)) return;
+    problems.push_back(describe_mismatch(option, what,
+                                         zero_is_fine ? "a number from 0 to 1e6" : "a number above 0, up to 1e6",
                                          std::isfinite(*value) ? nlohmann::json(*value).dump() : "another"));
   };
   expect(settings.band_vox, false, "--label-band", "voxels");

@@ -60,7 +60,7 @@ void read_yaml_class(const YAML::Node& row, const fs::path& path, Table& table) 
     info.id = *id;
   else
     table.problems.push_back(
-        describe_mismatch(where, "id", "a number from 0 to 65535", "'" + scalar_text(row["id"]) + "'"));
+        describe_mismatch(where, "id", "a number from 0 to 65534", "'" + scalar_text(row["id"]) + "'"));
   info.name = scalar_text(row["name"]);
   if (info.name.empty()) table.problems.push_back(describe_mismatch(where, "name", "a name", "none"));
   info.color = default_class_color(number);

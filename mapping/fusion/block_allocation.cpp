@@ -82,6 +82,11 @@ void mark_row(const DepthImage& depth_m, int v, int stride, float min_depth_m, f
 
 }  // namespace
 
+bool on_map(const Eigen::Isometry3d& T_world_camera, double voxel_size_m, double reach_m) {
+  const double farthest_m = T_world_camera.translation().cwiseAbs().maxCoeff() + reach_m;
+  return farthest_m < kFarthestBlock * kBlockDim * voxel_size_m;
+}
+
 std::vector<BlockCoord> blocks_in_view(const DepthImage& depth_m, const PinholeCamera& camera,
                                        const Eigen::Isometry3d& T_world_camera, double voxel_size_m,
                                        double truncation_m, float min_depth_m, float max_depth_m,

@@ -16,6 +16,10 @@ struct AllocationScratch {
   std::vector<float> offsets_m;
 };
 
+/// Whether all within `reach_m` of a camera has a place on the map: index coordinates are 32-bit. Elsewhere
+/// `blocks_in_view` finds none.
+bool on_map(const Eigen::Isometry3d& T_world_camera, double voxel_size_m, double reach_m);
+
 /// Coordinates, ascending, of the blocks that hold a voxel within the truncation of a measured surface. Rays of every
 /// n-th pixel are sampled at most half a block apart along and a quarter of a block across the ray (1 <= n <= 4), into
 /// a box of one byte a block around the view: time and memory do not depend on the size of the map. The same pass over

@@ -52,6 +52,25 @@ size_t allocate_blocks(Map& map, const std::vector<BlockCoord>& coords, bool wit
   return map.store.size() - before;
 }
 
+/// Carving reaches what the map has in the free space before this frame's surfaces, besides the blocks around them.
+void add_blocks_in_front(const Map& map, const Eigen::Isometry3d& T_world_camera, const DepthView& view,
+                         std::vector<BlockCoord>& coords, std::vector<uint32_t>& blocks) {
+  std::vector<bool> taken(map.store.size());
+  for (const uint32_t n : blocks) taken[n] = true;
+  const Eigen::Isometry3d T_camera_world = T_world_camera.inverse();
+  const double radius_m = 0.5 * std::sqrt(3.0) * kBlockDim * map.voxel_size_m;
+  const auto behind = [&](const BlockCoord& block) {
+    const Index3 first = first_voxel(block);
+    const Eigen::Vector3d centre = Eigen::Vector3d(first.x, first.y, first.z).array() + 0.5 * (kBlockDim - 1);
+    return (T_camera_world * (map.voxel_size_m * centre)).z() < -radius_m;
+  };
+  for (uint32_t n = 0; n < map.store.size(); ++n) {
+    if (taken[n] || behind(map.store[n].coord) || cubes_in_band(map.store[n].coord, view) == 0) continue;
+    coords.push_back(map.store[n].coord);
+    blocks.push_back(n);
+  }
+}
+
 /// What the next block needs of its planes travels while this one is fused. Always inline: GCC drops calls of a
 /// function that does nothing but prefetch.
 [[gnu::always_inline]] inline void prefetch(const Block& block, uint64_t cubes) {
@@ -121,7 +140,7 @@ DepthView depth_view(const Frame& frame, const IntegrationConfig& config, const 
 FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& config, IntegrationScratch& scratch) {
   FrameStats stats;
   const auto start = Clock::now();
-  const std::vector<BlockCoord> coords =
+  std::vector<BlockCoord> coords =
       blocks_in_view(frame.depth_m, frame.camera, frame.T_world_camera, map.voxel_size_m, map.truncation_m,
                      least_usable_m(config.min_depth_m), config.max_depth_m, scratch.allocation);
   stats.blocks_created = allocate_blocks(map, coords, !frame.color.empty(), scratch.blocks);
@@ -133,6 +152,7 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
   const bool tangent = config.distance == DistanceModel::tangent_plane;
   const DepthView view = depth_view(frame, config, map, tangent ? tangent_scale(frame, config, scratch) : nullptr,
                                     tangent ? nullptr : &scratch.allocation.tiles);
+  if (config.carve) add_blocks_in_front(map, frame.T_world_camera, view, coords, scratch.blocks);
   const auto* rgba = reinterpret_cast<const uint32_t*>(frame.color.data());
   const float color_band_m = std::min(view.truncation_m, config.color_band_vox * float(map.voxel_size_m));
   const bool says_classes = !frame.labels.empty() || !frame.probabilities.empty();

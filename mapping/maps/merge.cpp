@@ -130,6 +130,21 @@ void merge_even_evidence(std::span<const Block* const> from, BlockStore& store, 
   for (int i = 0; i < kBlockVoxels; ++i) to.even_evidence->value[i] = float(sum[i]);
 }
 
+/// Brings the evidence of voxels that have more than the cap down to it, all classes alike.
+void cap_evidence(Block& block, float max_evidence) {
+  float share[kBlockVoxels];
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    double total = block.even_evidence == nullptr ? 0 : double(block.even_evidence->value[i]);
+    for (const EvidencePlane& plane : block.evidence) total += double(plane.counts->value[i]);
+    share[i] = total > double(max_evidence) ? float(double(max_evidence) / total) : 1.0f;
+  }
+  const auto scale = [&](Plane& plane) {
+    for (int i = 0; i < kBlockVoxels; ++i) plane.value[i] *= share[i];
+  };
+  for (const EvidencePlane& plane : block.evidence) scale(*plane.counts);
+  if (block.even_evidence != nullptr) scale(*block.even_evidence);
+}
+
 /// The id with the most votes over all maps, and its lead over the other ids together; the smaller id of equals.
 void merge_instances(std::span<const Block* const> from, InstancePlanes& to) {
   for (int i = 0; i < kBlockVoxels; ++i) {
@@ -192,6 +207,7 @@ Map merge(std::span<const Map* const> maps, const MergeOptions& options) {
       merge_color(from, result.store.add_color(to));
     merge_evidence(from, result.store, to);
     merge_even_evidence(from, result.store, to);
+    if (options.max_evidence > 0) cap_evidence(to, options.max_evidence);
     if (std::any_of(from.begin(), from.end(), [](const Block* b) { return b->instance != nullptr; }))
       merge_instances(from, result.store.add_instance(to));
   }

@@ -12,13 +12,15 @@ struct MergeOptions {
   bool allow_shared_frames = false;
   /// Cap of the summed weight, as in integration (IntegrationConfig::max_weight).
   float max_weight = 255.0f;
+  /// Cap of a voxel's class evidence, likewise (LabelConfig::max_evidence); 0: none.
+  float max_evidence = 0.0f;
 };
 
 /// One map of what several maps of the same world frame observed: distances averaged by weight, colours by number of
 /// observations, weights and evidence added, journals of frames and touches joined. Equal to fusing all frames into one
-/// map: exactly where counts are added, within rounding where averages are, as long as no weight reached its cap. The
-/// result does not depend on the order of the arguments. Throws ConfigError naming every reason why the maps do not go
-/// together: voxel size, truncation, class table, property table, shared frames.
+/// map: exactly where counts are added, within rounding where averages are, as long as no weight and no evidence
+/// reached its cap. The result does not depend on the order of the arguments. Throws ConfigError naming every reason
+/// why the maps do not go together: voxel size, truncation, class table, property table, shared frames.
 Map merge(std::span<const Map* const> maps, const MergeOptions& options = {});
 
 }  // namespace felt

@@ -107,13 +107,20 @@ Region segment_around(const Map& map, const Contact& contact, const RegionSettin
 }
 
 /// Says what is at a point that is too far from every surface.
-[[noreturn]] void fail_to_snap(const Map& map, const Eigen::Vector3d& p, const std::string& where, double radius_m) {
+[[noreturn]] void fail_to_snap(const Map& map, const Eigen::Vector3d& p, const std::string& where, double radius_m,
+                               double min_weight) {
   const std::string expected = "observed surface within " + metres(radius_m);
   const Eigen::Vector3d q = p / map.voxel_size_m;
   const Index3 v{int32_t(std::lround(q.x())), int32_t(std::lround(q.y())), int32_t(std::lround(q.z()))};
   const Block* block = map.store.get(block_of_voxel(v));
   if (block != nullptr && block->geometry->weight[offset_in_block(v)] > 0) {
     const double d = block->geometry->tsdf[offset_in_block(v)];
+    if (std::abs(d) <= map.voxel_size_m && double(block->geometry->weight[offset_in_block(v)]) < min_weight) {
+      char weights[64];
+      snprintf(weights, sizeof weights, "surface of weight %.3g, least %.3g",
+               double(block->geometry->weight[offset_in_block(v)]), min_weight);
+      throw TouchError(describe_mismatch(where, "contact", expected, weights));
+    }
     throw TouchError(describe_mismatch(where, "contact", expected,
                                        d > 0 ? "free space (signed distance " + metres(d) + ")"
                                              : "the inside of something (signed distance " + metres(d) + ")"));
@@ -161,7 +168,7 @@ Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const Regio
         best = cost;
         contact.voxel = {x, y, z};
       }
-  if (!std::isfinite(best)) fail_to_snap(map, point_m, where, radius * map.voxel_size_m);
+  if (!std::isfinite(best)) fail_to_snap(map, point_m, where, radius * map.voxel_size_m, settings.min_weight);
   contact.normal = surface_normal(map, contact.voxel, band.min_weight).cast<double>();
   const Block& block = *map.store.get(block_of_voxel(contact.voxel));
   contact.surface_m = Eigen::Vector3d(contact.voxel.x, contact.voxel.y, contact.voxel.z) * map.voxel_size_m -
@@ -201,6 +208,7 @@ Region find_region(const Map& map, const Contact& contact, const RegionSettings&
         describe_mismatch("region", "rule", "connected, sphere, instance or segment", rule_name(settings.rule)));
   rule.slot = contact.slot;
   rule.class_ratio = float(settings.class_ratio);
+  for (int c = 0; c < map.classes.size(); ++c) rule.prior.push_back(float(map.classes.prior(c)));
   rule.cos_normal_change = float(std::cos(normal_limit_deg(map, contact, settings) * std::numbers::pi / 180));
   if (std::isfinite(settings.color_change)) limit_color(map, contact.voxel, settings.color_change, rule);
   Region region = flood_region(map, rule, contact.voxel);

@@ -71,18 +71,25 @@ BlockMask belongs_to(const Block& block, uint16_t instance) {
 }
 
 BlockMask agrees_with_class(const Block& block, const SurfaceRule& rule) {
-  float own[kBlockVoxels] = {}, best[kBlockVoxels] = {}, total[kBlockVoxels] = {};
+  // Concentrations less what was spread evenly, of the class and of the strongest one.
+  float own[kBlockVoxels], best[kBlockVoxels], total[kBlockVoxels] = {}, even[kBlockVoxels] = {};
+  std::fill_n(own, kBlockVoxels, rule.prior[size_t(rule.slot)]);
+  std::fill_n(best, kBlockVoxels, *std::max_element(rule.prior.begin(), rule.prior.end()));
   for (const EvidencePlane& e : block.evidence) {
     const float* count = e.counts->value;
-    if (e.slot == rule.slot) std::copy_n(count, kBlockVoxels, own);
+    const float prior = rule.prior[e.slot];
     for (int i = 0; i < kBlockVoxels; ++i) {
-      best[i] = std::max(best[i], count[i]);
+      if (e.slot == rule.slot) own[i] += count[i];
+      best[i] = std::max(best[i], prior + count[i]);
       total[i] += count[i];
     }
   }
+  if (block.even_evidence != nullptr)
+    for (int i = 0; i < kBlockVoxels; ++i) even[i] = block.even_evidence->value[i] / float(rule.prior.size());
   // One label alone must decide: at a ratio of a half, as much belief as half of the strongest is not enough.
-  return where(
-      [&](int i) { return (total[i] > 0) & ((own[i] >= best[i]) | (1 + own[i] > rule.class_ratio * (1 + best[i]))); });
+  return where([&](int i) {
+    return (total[i] > 0) & ((own[i] >= best[i]) | (own[i] + even[i] > rule.class_ratio * (best[i] + even[i])));
+  });
 }
 
 BlockMask agrees_with_color(const Block& block, const SurfaceRule& rule) {

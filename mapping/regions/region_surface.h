@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <limits>
+#include <vector>
 
 #include "mapping/map.h"
 #include "mapping/regions/interior_kernels.h"
@@ -17,6 +18,7 @@ struct SurfaceRule {
   uint16_t instance = 0;     ///< thing to belong to; 0: things do not matter
   int slot = -1;             ///< class to agree with; -1: classes do not matter
   float class_ratio = 0;     ///< see RegionSettings
+  std::vector<float> prior;  ///< concentrations by slot
   bool limit_color = false;  ///< whether `color` and `color_change` count
   float color[3] = {0, 0, 0};
   float color_change = 0;

@@ -124,6 +124,7 @@ MixtureState mixture_state(const Map& map, const Region& region) {
   MixtureState out;
   out.refused.assign(map.touches.touches.size(), 0);
   for (const Property& property : map.properties.properties()) out.priors.push_back(nig_priors(property, map.classes));
+  if (std::none_of(map.touches.touches.begin(), map.touches.touches.end(), is_mixture)) return out;
   Region mixed, material;
   for (const Touch& touch : map.touches.touches) {
     if (touch.undone) continue;

@@ -44,11 +44,28 @@ std::vector<double> summed_concentration(const Map& map, const Region& region) {
   return total;
 }
 
-Region union_of(const Map& map, const std::vector<uint32_t>& touches, Region region = {}) {
-  for (const uint32_t t : touches)
-    if (map.touches.touches[t].request.model == TouchModel::material)
-      region = united(region, map.touches.touches[t].region);
-  return region;
+/// Adds the voxels of `other`: in place where they lie in blocks that `sum` has.
+void unite(Region& sum, const Region& other) {
+  size_t s = 0;
+  for (size_t b = 0; b < other.blocks(); ++b) {
+    while (s < sum.blocks() && sum.coord[s] < other.coord[b]) ++s;
+    if (s == sum.blocks() || !(sum.coord[s] == other.coord[b])) {
+      sum = united(sum, other);
+      return;
+    }
+    sum.mask[s] |= other.mask[b];
+  }
+}
+
+size_t voxels_in_both(const Region& a, const Region& b) {
+  size_t n = 0;
+  for (size_t i = 0, j = 0; i < a.blocks() && j < b.blocks();) {
+    if (a.coord[i] == b.coord[j])
+      n += size_t((a.mask[i++] & b.mask[j++]).count());
+    else
+      ++(a.coord[i] < b.coord[j] ? i : j);
+  }
+  return n;
 }
 
 /// The next reading by slot: of this region where it was touched (`material`), else of the classes. Classes without a
@@ -78,6 +95,12 @@ std::vector<Nig> nig_priors(const Property& property, const ClassTable& classes)
   return nig;
 }
 
+Region material_reach(const Map& map, const std::vector<uint32_t>& touches, Region region) {
+  for (const uint32_t t : touches)
+    if (map.touches.touches[t].request.model == TouchModel::material) unite(region, map.touches.touches[t].region);
+  return region;
+}
+
 std::vector<double> pooled_belief(const Map& map, const Region& region) {
   std::vector<double> belief = summed_concentration(map, region);
   const double total = std::accumulate(belief.begin(), belief.end(), 0.0);
@@ -103,21 +126,25 @@ std::vector<uint32_t> covering_touches(const Map& map, const Region& region) {
   std::vector<uint32_t> touches;
   const size_t voxels = region.voxels();
   for (uint32_t t = 0; t < map.touches.touches.size(); ++t)
-    if (const Touch& touch = map.touches.touches[t];
-        !touch.undone && 2 * intersected(touch.region, region).voxels() > voxels)
+    if (const Touch& touch = map.touches.touches[t]; !touch.undone && 2 * voxels_in_both(touch.region, region) > voxels)
       touches.push_back(t);
   return touches;
+}
+
+bool any_mixture(const Map& map, const std::vector<uint32_t>& touches) {
+  return std::any_of(touches.begin(), touches.end(),
+                     [&](uint32_t t) { return map.touches.touches[t].request.model == TouchModel::mixture; });
 }
 
 Beliefs::Beliefs(const Map& map) : map_(map) {
   for (const Property& property : map.properties.properties()) priors_.push_back(nig_priors(property, map.classes));
 }
 
-MaterialState Beliefs::evaluate(std::span<const double> vision, const std::vector<uint32_t>& touches) const {
+MaterialState Beliefs::evaluate(std::span<const double> pooled, const std::vector<uint32_t>& touches) const {
   MaterialState state;
   state.properties.resize(priors_.size());
   state.readings.assign(priors_.size(), 0);
-  std::vector<double> log_likelihood(vision.size(), 0.0);
+  std::vector<double> log_likelihood(pooled.size(), 0.0);
   for (size_t p = 0; p < priors_.size(); ++p) {
     const Property& property = map_.properties[int(p)];
     std::vector<double> psi, noise;
@@ -132,17 +159,17 @@ MaterialState Beliefs::evaluate(std::span<const double> vision, const std::vecto
     if (psi.empty()) continue;
     const bool exact = std::all_of(noise.begin(), noise.end(), [](double sigma) { return sigma == 0; });
     if (exact) noise.clear();
-    state.properties[p] = material_posterior(vision, priors_[p], psi, noise, rho);
+    state.properties[p] = material_posterior(pooled, priors_[p], psi, noise, rho);
     state.readings[p] = double(psi.size());
-    for (size_t c = 0; c < vision.size(); ++c) log_likelihood[c] += state.properties[p].classes[c].log_evidence;
+    for (size_t c = 0; c < pooled.size(); ++c) log_likelihood[c] += state.properties[p].classes[c].log_evidence;
   }
-  state.classes = class_posterior(vision, log_likelihood);
+  state.classes = class_posterior(pooled, log_likelihood);
   return state;
 }
 
 const MaterialState& Beliefs::material(const std::vector<uint32_t>& touches) {
   const auto [at, is_new] = cache_.try_emplace(touches);
-  if (is_new) at->second = evaluate(pooled_belief(map_, union_of(map_, touches)), touches);
+  if (is_new) at->second = evaluate(pooled_belief(map_, material_reach(map_, touches)), touches);
   return at->second;
 }
 
@@ -210,8 +237,22 @@ Belief Beliefs::of(const Region& region, const std::vector<uint32_t>& touches) {
   std::vector<double> mean = summed_concentration(map_, region);
   for (double& alpha : mean) alpha /= double(region.voxels());
   if (!has_material(touches)) return assemble(std::move(mean), nullptr, touches);
-  const MaterialState state = evaluate(pooled_belief(map_, union_of(map_, touches, region)), touches);
+  const MaterialState state = evaluate(pooled_belief(map_, material_reach(map_, touches, region)), touches);
   return assemble(std::move(mean), &state, touches);
+}
+
+std::vector<std::pair<size_t, Region>> taken_out(std::vector<TouchGroup>& groups, const Region& region) {
+  std::vector<std::pair<size_t, Region>> taken;
+  Region rest = region;
+  for (size_t g = 0; g < groups.size() && !rest.empty(); ++g) {
+    Region shared = intersected(groups[g].region, rest);
+    if (shared.empty()) continue;
+    rest = subtracted(rest, shared);
+    groups[g].region = subtracted(groups[g].region, shared);
+    taken.emplace_back(g, std::move(shared));
+  }
+  if (!rest.empty()) taken.emplace_back(groups.size(), std::move(rest));
+  return taken;
 }
 
 std::vector<TouchGroup> touch_groups(const Map& map) {
@@ -219,18 +260,12 @@ std::vector<TouchGroup> touch_groups(const Map& map) {
   for (uint32_t t = 0; t < map.touches.touches.size(); ++t) {
     const Touch& touch = map.touches.touches[t];
     if (touch.undone) continue;
-    Region rest = touch.region;
     const size_t known = groups.size();
-    for (size_t g = 0; g < known && !rest.empty(); ++g) {
-      Region shared = intersected(groups[g].region, rest);
-      if (shared.empty()) continue;
-      rest = subtracted(rest, shared);
-      std::vector<uint32_t> touches = groups[g].touches;
+    for (auto& [from, shared] : taken_out(groups, touch.region)) {
+      std::vector<uint32_t> touches = from < known ? groups[from].touches : std::vector<uint32_t>();
       touches.push_back(t);
-      groups[g].region = subtracted(groups[g].region, shared);
       groups.push_back({std::move(touches), std::move(shared)});
     }
-    if (!rest.empty()) groups.push_back({{t}, std::move(rest)});
     std::erase_if(groups, [](const TouchGroup& g) { return g.region.empty(); });
   }
   std::sort(groups.begin(), groups.end(),

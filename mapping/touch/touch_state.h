@@ -2,6 +2,7 @@
 
 #include <map>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "inference/material.h"
@@ -21,10 +22,16 @@ std::vector<Nig> nig_priors(const Property& property, const ClassTable& classes)
 /// below 1e-6. One sum a block, then blocks in canonical order: the same for any number of threads.
 std::vector<double> pooled_belief(const Map& map, const Region& region);
 
+/// Union of the regions of those of these touches that are `material` ones.
+Region material_reach(const Map& map, const std::vector<uint32_t>& touches, Region region = {});
+
 /// Indices (into the journal, ascending) of the active touches that cover a voxel.
 std::vector<uint32_t> covering_touches(const Map& map, const Index3& voxel);
 /// Those that cover more than half of a region: they speak for it as a whole, others for a part of it.
 std::vector<uint32_t> covering_touches(const Map& map, const Region& region);
+
+/// Whether one of these touches (places in the journal) is a `mixture` one.
+bool any_mixture(const Map& map, const std::vector<uint32_t>& touches);
 
 /// What is believed of a voxel, or of a region whose voxels share their touches.
 struct Belief {
@@ -66,6 +73,8 @@ public:
 
   /// Posterior of the voxels that exactly these touches cover; at least one of them `material`.
   const MaterialState& material(const std::vector<uint32_t>& touches);
+  /// The same, not kept; may be asked by several threads at once. `pooled`: the belief pooled over all their regions.
+  MaterialState evaluate(std::span<const double> pooled, const std::vector<uint32_t>& touches) const;
   bool has_material(const std::vector<uint32_t>& touches) const;
   /// State of a voxel with these vision concentrations: material readings first, then `mixture` readings one by one.
   Belief assemble(std::vector<double> vision, const MaterialState* material,
@@ -73,8 +82,6 @@ public:
   const std::vector<std::vector<Nig>>& priors() const { return priors_; }
 
 private:
-  MaterialState evaluate(std::span<const double> vision, const std::vector<uint32_t>& touches) const;
-
   const Map& map_;
   std::vector<std::vector<Nig>> priors_;
   std::map<std::vector<uint32_t>, MaterialState> cache_;
@@ -86,5 +93,9 @@ struct TouchGroup {
   Region region;
 };
 std::vector<TouchGroup> touch_groups(const Map& map);
+
+/// Takes a region out of groups, which may leave some of them empty, and returns what each of them had of it, with the
+/// group's place; what none had comes last, with the place behind them. No returned region is empty.
+std::vector<std::pair<size_t, Region>> taken_out(std::vector<TouchGroup>& groups, const Region& region);
 
 }  // namespace felt

@@ -153,34 +153,49 @@ uint64_t add_touch(Map& map, Touch touch) {
   return id;
 }
 
-TouchEffect apply_touch(Map& map, Touch touch) {
+TouchEffect TouchBatch::apply(Touch touch) {
   const double psi = touch.request.value;
-  const size_t property = size_t(*map.properties.index_of(touch.request.property));
+  const size_t property = size_t(*map_.properties.index_of(touch.request.property));
   TouchEffect effect;
-  effect.before = Beliefs(map).of(touch.region, covering_touches(map, touch.region));
-  const TouchedLabels before = touched_labels(map, touch.region);
+  effect.before = Beliefs(map_).of(touch.region, covering_touches(map_, touch.region));
+  if (!labels_) labels_.emplace(map_);
+  const TouchedLabels::Answer before = labels_->of(touch.region);
   const StudentTMixture& expected = effect.before.next_reading[property];
   if (!expected.weight.empty()) {
     effect.flags = region_flags(expected, psi);
     effect.tail_probability = tail_probability(expected, psi);
   }
-  effect.id = insert(map.touches, std::move(touch));
-  Touch& recorded = *map.touches.find(effect.id);
+  effect.id = insert(map_.touches, std::move(touch));
+  Touch& recorded = *map_.touches.find(effect.id);
   try {
-    const auto own = uint32_t(&recorded - map.touches.touches.data());
-    effect.after = Beliefs(map).of(recorded.region, covering_touches(map, recorded.region));
-    const TouchedLabels after = touched_labels(map, recorded.region);
+    const auto own = uint32_t(&recorded - map_.touches.touches.data());
+    effect.after = Beliefs(map_).of(recorded.region, covering_touches(map_, recorded.region));
+    labels_->insert(own);
+    const TouchedLabels::Answer after = labels_->of(recorded.region);
     for (size_t i = 0; i < after.label.size(); ++i) effect.relabelled += before.label[i] != after.label[i];
     effect.refused = after.refused[own];
   } catch (...) {
-    std::erase_if(map.touches.touches, [&](const Touch& t) { return t.id == effect.id; });
+    std::erase_if(map_.touches.touches, [&](const Touch& t) { return t.id == effect.id; });
+    labels_.reset();
     throw;
   }
   effect.modes = modes(effect.after.next_reading[property]);
   recorded.before = summary_of(effect.before, property);
   recorded.after = summary_of(effect.after, property);
   recorded.refused_voxels = effect.refused;
-  update_blocks(map, recorded.region);
+  touched_ = united(touched_, recorded.region);
+  return effect;
+}
+
+void TouchBatch::finish() {
+  update_blocks(map_, touched_);
+  touched_ = {};
+}
+
+TouchEffect apply_touch(Map& map, Touch touch) {
+  TouchBatch batch(map);
+  TouchEffect effect = batch.apply(std::move(touch));
+  batch.finish();
   return effect;
 }
 

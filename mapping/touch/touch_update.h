@@ -1,10 +1,11 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "inference/decision.h"
 #include "mapping/regions/region_query.h"
-#include "mapping/touch/touch_state.h"
+#include "mapping/touch/touched_labels.h"
 
 namespace felt {
 
@@ -31,8 +32,23 @@ struct TouchEffect {
   uint64_t refused = 0;         ///< voxels that kept their state: the projection was no valid prior
 };
 
-/// `add_touch` with a report of what it changed, which is also noted in the journal. Where it throws (no class has a
-/// prior for every property touched here) the map is as before.
+/// Records touches one after another, each with a report of what it changed, which is also noted in the journal. What
+/// one touch left as it was is not computed again for the next.
+class TouchBatch {
+public:
+  explicit TouchBatch(Map& map) : map_(map) {}
+  /// Where it throws (no class has a prior for every property touched here) the journal is as before.
+  TouchEffect apply(Touch touch);
+  /// Brings the statistics planes of all touched blocks up to date: to be called once, at the end.
+  void finish();
+
+private:
+  Map& map_;
+  std::optional<TouchedLabels> labels_;
+  Region touched_;
+};
+
+/// A batch of one.
 TouchEffect apply_touch(Map& map, Touch touch);
 
 /// Takes a touch out of the map's state, or back into it: exact. Throw TouchError where there is no such touch, or it

@@ -33,15 +33,6 @@ Cell cell_of(const std::vector<double>& p, const std::vector<StudentTMixture>& n
   return cell;
 }
 
-int16_t vision_label(const Block* block, int offset) {
-  float best = 0;
-  int16_t label = -1;
-  if (block != nullptr)
-    for (const EvidencePlane& e : block->evidence)
-      if (e.counts->value[offset] > best) best = e.counts->value[offset], label = int16_t(e.slot);
-  return label;
-}
-
 /// Belief of one voxel of a mixture block.
 Belief belief_of(const MixtureState& state, const MixtureBlock& block, size_t i) {
   const size_t m = block.voxels, k = block.a.size() / m;
@@ -61,11 +52,6 @@ Belief belief_of(const MixtureState& state, const MixtureBlock& block, size_t i)
   return belief;
 }
 
-bool any_mixture(const Map& map, const TouchGroup& group) {
-  return std::any_of(group.touches.begin(), group.touches.end(),
-                     [&](uint32_t t) { return map.touches.touches[t].request.model == TouchModel::mixture; });
-}
-
 /// Whether a property of the group has `material` readings and no `mixture` ones.
 bool any_material_only(const Map& map, const TouchGroup& group) {
   const auto has = [&](const std::string& property, TouchModel model) {
@@ -80,48 +66,6 @@ bool any_material_only(const Map& map, const TouchGroup& group) {
 }
 
 }  // namespace
-
-TouchedLabels touched_labels(const Map& map, const Region& region) {
-  TouchedLabels out;
-  std::vector<size_t> first(region.blocks() + 1, 0);
-  for (size_t b = 0; b < region.blocks(); ++b) first[b + 1] = first[b] + size_t(region.mask[b].count());
-  out.label.assign(first.back(), -1);
-  const auto visit = [&](size_t b, const auto& label_at) {
-    size_t n = first[b];
-    for_each_bit(region.mask[b], [&](int i) { label_at(out.label[n++], i); });
-  };
-  tbb::parallel_for(size_t(0), region.blocks(), [&](size_t b) {
-    const Block* block = map.store.get(region.coord[b]);
-    visit(b, [&](int16_t& label, int i) { label = vision_label(block, i); });
-  });
-  Beliefs beliefs(map);
-  for (const TouchGroup& group : touch_groups(map)) {
-    const Region shared = intersected(group.region, region);
-    if (shared.empty() || any_mixture(map, group)) continue;
-    const auto label = int16_t(most_probable_class(beliefs.material(group.touches).classes.p));
-    for (size_t s = 0; s < shared.blocks(); ++s) {
-      const size_t b = size_t(region.find(shared.coord[s]) - region.mask.data());
-      visit(b, [&](int16_t& at, int i) {
-        if (shared.mask[s].test(i)) at = label;
-      });
-    }
-  }
-  const MixtureState mixed = mixture_state(map, region);
-  out.refused = mixed.refused;
-  for (const MixtureBlock& block : mixed.blocks) {
-    const size_t b = size_t(region.find(block.coord) - region.mask.data()), m = block.voxels;
-    size_t i = 0;
-    visit(b, [&](int16_t& at, int offset) {
-      if (!block.mask.test(offset)) return;
-      size_t best = 0;
-      for (size_t c = 1; c < block.a.size() / m; ++c)
-        if (block.a[c * m + i] > block.a[best * m + i]) best = c;
-      at = int16_t(best);
-      ++i;
-    });
-  }
-  return out;
-}
 
 const TouchView* view_of(const std::vector<TouchView>& views, const BlockCoord& block) {
   const auto at = std::lower_bound(views.begin(), views.end(), block,
@@ -143,7 +87,7 @@ TouchBlocks::TouchBlocks(const Map& map) {
   Region touched;
   for (TouchGroup& group : touch_groups(map)) {
     touched = united(touched, group.region);
-    if (any_mixture(map, group)) continue;
+    if (any_mixture(map, group.touches)) continue;
     const MaterialState& state = beliefs.material(group.touches);
     groups_.push_back({std::move(group.region), beliefs.assemble(state.classes.p, &state, group.touches).nig});
   }
@@ -193,7 +137,7 @@ std::vector<TouchView> touch_views(const Map& map) {
   };
   Beliefs beliefs(map);
   for (const TouchGroup& group : groups) {
-    if (any_mixture(map, group)) continue;
+    if (any_mixture(map, group.touches)) continue;
     const MaterialState& state = beliefs.material(group.touches);
     const Belief belief = beliefs.assemble(state.classes.p, &state, group.touches);
     const Cell cell = cell_of(state.classes.p, belief.next_reading);
@@ -206,7 +150,7 @@ std::vector<TouchView> touch_views(const Map& map) {
   // voxels that another property's `mixture` touches cover as well are answered one by one.
   Region apart;
   for (const TouchGroup& group : groups)
-    if (any_mixture(map, group) && any_material_only(map, group)) apart = united(apart, group.region);
+    if (any_mixture(map, group.touches) && any_material_only(map, group)) apart = united(apart, group.region);
   for (size_t b = 0; b < apart.blocks(); ++b) {
     TouchView& view = view_of(apart.coord[b]);
     for_each_bit(apart.mask[b], [&](int i) {

@@ -44,11 +44,4 @@ private:
   MixtureState mixed_;
 };
 
-/// Strongest class of every voxel of a region in canonical order, touched or not: -1 without evidence and touches.
-struct TouchedLabels {
-  std::vector<int16_t> label;
-  std::vector<uint64_t> refused;  ///< by touch (place in the journal): voxels whose state it left as it was
-};
-TouchedLabels touched_labels(const Map& map, const Region& region);
-
 }  // namespace felt

@@ -28,11 +28,8 @@ VoxelBeliefs::VoxelBeliefs(const Map& map) : map_(map), touched_block_(map.store
         visit(block, number_of(region.coord[b]), region.mask[b]);
   };
   for (const TouchGroup& group : touch_groups(map)) {
-    const bool mixture = std::any_of(group.touches.begin(), group.touches.end(), [&](uint32_t t) {
-      return map_.touches.touches[t].request.model == TouchModel::mixture;
-    });
     const MaterialState* material = beliefs.has_material(group.touches) ? &beliefs.material(group.touches) : nullptr;
-    if (!mixture) {
+    if (!any_mixture(map, group.touches)) {
       // Equally touched voxels of one material share one state.
       const auto number = uint32_t(states_.size());
       states_.push_back(

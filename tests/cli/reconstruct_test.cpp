@@ -296,4 +296,60 @@ TEST_CASE("info describes a map and a sequence") {
   CHECK(run_feltmap("info " + quoted(out.path() / "absent.vdb")).exit_code == 4);
 }
 
+TEST_CASE("a sequence that says its depth is the length of rays is believed, unless an option says otherwise") {
+  const TemporaryDirectory folder;
+  const fs::path rays = folder.path() / "rays";
+  fs::copy(boxes(), rays, fs::copy_options::recursive);
+  std::ofstream(rays / "sequence.yaml", std::ios::app) << "depth_is_ray_length: true\n";
+  const auto hash = [&](const fs::path& sequence, const std::string& name, const std::string& options) {
+    const CommandResult result = reconstruct(sequence, folder.path() / name, "--json --frames 0:4 " + options);
+    INFO(result.err);
+    REQUIRE(result.exit_code == 0);
+    return json::parse(result.out).at("map_hash").get<std::string>();
+  };
+  const std::string plain = hash(boxes(), "a", ""), by_option = hash(boxes(), "b", "--ray-length");
+  CHECK(plain != by_option);
+  CHECK(hash(rays, "c", "") == by_option);
+  CHECK(hash(rays, "d", "--no-ray-length") == plain);
+}
+
+TEST_CASE("a frame whose pose lies outside the map is a counted skip") {
+  const TemporaryDirectory folder;
+  const fs::path far = folder.path() / "far";
+  fs::copy(boxes(), far, fs::copy_options::recursive);
+  std::string poses = file_text(far / "poses.txt");
+  std::vector<std::string> lines;
+  std::istringstream stream(poses);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  std::ofstream out(far / "poses.txt");
+  for (size_t n = 0; n < lines.size(); ++n) {
+    std::istringstream cells(lines[n]);
+    std::vector<std::string> words;
+    for (std::string word; cells >> word;) words.push_back(word);
+    // The second frame stands a thousand million metres along x: of 16 numbers the fourth, of seven the first.
+    if (n == 1) words[words.size() == 17 ? 4 : 1] = "1e9";
+    for (const std::string& word : words) out << word << ' ';
+    out << '\n';
+  }
+  out.close();
+  const CommandResult result = reconstruct(far, folder.path() / "result", "--json");
+  INFO(result.err);
+  REQUIRE(result.exit_code == 0);
+  const json frames = json::parse(result.out).at("frames");
+  CHECK(frames.at("read") == 12);
+  CHECK(frames.at("fused") == 11);
+  CHECK(frames.at("skipped") == json{{"pose outside the map", 1}});
+}
+
+TEST_CASE("settings of labels that floats or the cap cannot hold are refused") {
+  const TemporaryDirectory folder;
+  for (const char* options :
+       {"--label-evidence 1e39", "--class-prior 1e308", "--label-evidence 100", "--label-cap 0.5"}) {
+    INFO(options);
+    const CommandResult result = reconstruct(boxes(), folder.path() / "result", options);
+    CHECK(result.exit_code == 3);
+    CHECK_THAT(result.err, Catch::Contains("expected") && Catch::Contains("found"));
+  }
+}
+
 }  // namespace felt::test

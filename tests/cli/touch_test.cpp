@@ -110,11 +110,11 @@ TEST_CASE("what cannot be touched is refused with one line and leaves the file a
   refused("--at 0.2,0,0.085 --property friction --value 0.3", 4, "free space");
   refused("--at 0.2,0,0 --property stiffness --value 0.3", 4, "stiffness");
   refused("--at 0.2,0,0 --property friction --value=-0.3", 4, "[0, inf]");
-  refused("--at 0.2,0,0 --property friction --value nan", 4, "value");
+  refused("--at 0.2,0,0 --property friction --value nan", 2, "value");
   refused("--at 0.2,0 --property friction --value 0.3", 2, "x,y,z");
   refused("--at 0.2,0,0", 2, "property");
   refused("--undo 0123456789abcdef", 4, "no such id");
-  refused("--at 0.2,0,0 --property friction --value 0.3 --region sphere", 4, "finite radius");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --region sphere", 3, "--radius");
   refused("--at 0.2,0,-0.085 --property friction --value 0.3", 4, "inside of something");
   refused("--at 0.2,0,-0.3 --property friction --value 0.3", 4, "outside the map");
   refused("--at nan,0,0 --property friction --value 0.3", 2, "x,y,z");
@@ -123,13 +123,13 @@ TEST_CASE("what cannot be touched is refused with one line and leaves the file a
   refused("--at 0.2,0,0 --property friction --value 0.3 --sigma 1e160", 4, "sigma");
   refused("--at 0.2,0,0 --property friction --value 0.3 --pixel 1,2", 2, "--frame");
   refused("--at 0.2,0,0 --property friction --value 0.3 --mask m.png", 3, "--region mask");
-  refused("--at 0.2,0,0 --property friction --value inf", 4, "value");
-  refused("--at 0.2,0,0 --property friction --value 0.3 --sigma=-1", 4, "sigma");
-  refused("--at 0.2,0,0 --property friction --value 0.3 --stamp nan", 4, "stamp");
-  refused("--at 0.2,0,0 --property friction --value 0.3 --rho 1", 4, "rho");
+  refused("--at 0.2,0,0 --property friction --value inf", 2, "value");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --sigma=-1", 2, "sigma");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --stamp nan", 2, "stamp");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --rho 1", 2, "rho");
   refused("--at 0.2,0,0 --property friction --value 0.3 --region instance", 4, "--instances");
   refused("--at 0.2,0,0 --property friction --value 0.3 --model magic", 2, "magic");
-  refused("--at 0.2,0,0 --property friction --value 0.3 --region mask", 4, "--intrinsics");
+  refused("--at 0.2,0,0 --property friction --value 0.3 --region mask", 3, "--intrinsics");
 
   const std::string pose = " --pose 1,0,0,0,0,-1,0,0,0,0,-1,1,0,0,0,1", mask = (folder.path() / "mask.png").string();
   cv::imwrite(mask, cv::Mat(48, 64, CV_8U, cv::Scalar(255)));
@@ -265,6 +265,40 @@ TEST_CASE("a force log pressed on the map becomes a touch of it") {
   const json touched = ask("touch " + map + " --file " + touches)["touches"][0];
   CHECK(touched["after"]["class"] == "ice");
   CHECK(touched["sigma"] == Approx(answer["kinetic"]["sd"].get<double>()).epsilon(0.01));
+}
+
+TEST_CASE("wrong values of a touch's options are faults of the command line") {
+  const TemporaryDirectory folder;
+  const std::string map = save_floor(folder), before = bytes_of(map);
+  const std::string good = "touch " + map + " --at=-0.2,0,0 --property friction --value 0.139";
+  for (const char* wrong :
+       {"--sigma=-1", "--sigma nan", "--rho 1", "--snap 100", "--band 0", "--class-ratio 2", "--normal-change 181",
+        "--color-change=-1", "--radius 0", "--min-weight 0", "--stamp inf", "--sequence x"}) {
+    INFO(wrong);
+    const CommandResult result = run_feltmap(good + " " + wrong);
+    CHECK(result.exit_code == 2);
+    CHECK_THAT(result.err, Catch::Contains(std::string(wrong).substr(0, 5)));
+  }
+  for (const char* of_a_reading : {"--sigma 1", "--model mixture", "--radius 1", "--properties x.yaml"}) {
+    INFO(of_a_reading);
+    CHECK(run_feltmap("touch " + map + " --undo 3f0c5d8a91e2b764 " + of_a_reading).exit_code == 2);
+    CHECK(run_feltmap("touch " + map + " --list " + of_a_reading).exit_code == 2);
+  }
+  CHECK(run_feltmap("touch " + map + " --frame 1 --pixel 1,1 --property friction --value 1").exit_code == 2);
+  CHECK(run_feltmap(good + " --region sphere").exit_code == 3);
+  CHECK(run_feltmap(good + " --region mask").exit_code == 3);
+  CHECK(bytes_of(map) == before);
+}
+
+TEST_CASE("touches that the map has already are applied, with a warning that they count twice") {
+  const TemporaryDirectory folder;
+  const std::string map = save_floor(folder), csv = (folder.path() / "touches.csv").string();
+  write_file_atomically(csv, "stamp,x,y,z,property,value\n1,-0.2,0,0,friction,0.17\n2,0.2,0,0,friction,0.36\n");
+  CHECK(run_feltmap("touch " + map + " --file " + csv).err.empty());
+  const CommandResult again = run_feltmap("touch " + map + " --file " + csv);
+  CHECK(again.exit_code == 0);
+  CHECK_THAT(again.err, Catch::Contains("2 of 2 touches repeat"));
+  CHECK(load_map(map).touches.touches.size() == 4);
 }
 
 }  // namespace felt::test

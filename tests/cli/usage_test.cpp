@@ -41,4 +41,17 @@ TEST_CASE("an unknown command is named beside those there are") {
   CHECK_THAT(result.err, Catch::Matchers::Contains("friction"));
 }
 
+TEST_CASE("help that cannot be written is an error of output") {
+  const CommandResult result = run_feltmap_within("", "--help", " >/dev/full");
+  CHECK(result.exit_code == 4);
+  CHECK_THAT(result.err, Catch::Matchers::Contains("standard output: cannot be written"));
+}
+
+TEST_CASE("a seed below zero and depths in the wrong order are refused") {
+  CHECK(run_feltmap("simulate room --out x --seed=-1").exit_code == 2);
+  const CommandResult result = run_feltmap("evaluate x.vdb --reference-mesh y.ply --min-depth 5 --max-depth 4");
+  CHECK(result.exit_code == 3);
+  CHECK_THAT(result.err, Catch::Matchers::Contains("expected a number above --min-depth, 5.0, found 4.0"));
+}
+
 }  // namespace felt::test

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "mapping/fusion/block_allocation.h"
 #include "mapping/fusion/survey_kernels.h"
 #include "mapping/fusion/tsdf_integrator.h"
 #include "tests/support/views.h"
@@ -328,4 +329,40 @@ TEST_CASE("fused colours are the surface's") {
   CHECK(red > 300);
   CHECK(blue > 300);
   CHECK(wrong < (red + blue) / 20);  // voxels at the ball's silhouette see both
+}
+
+TEST_CASE("carving erases what stood before the surface seen later, and nothing else does") {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  const Frame with_ball = ball_before_wall(pose), without = ball_before_wall(pose, 160, 120, 0.3, 2.0, {50, 0, 1.4});
+  for (const bool carve : {false, true}) {
+    IntegrationConfig config;
+    config.carve = carve;
+    Map map(0.02, 0.08);
+    IntegrationScratch scratch;
+    for (int n = 0; n < 3; ++n) integrate(map, with_ball, config, scratch);
+    const size_t blocks = map.store.size();
+    for (int n = 0; n < 20; ++n) integrate(map, without, config, scratch);
+    INFO("carve " << carve);
+    // The foremost point of the ball, and the wall beside it.
+    const auto tsdf = [&](const Index3& v) {
+      return map.store.get(block_of_voxel(v))->geometry->tsdf[offset_in_block(v)];
+    };
+    CHECK(std::abs(tsdf({50, 0, 100})) < 0.01f);
+    if (carve)
+      CHECK(tsdf({0, 0, 55}) > 0.06f);
+    else
+      CHECK(std::abs(tsdf({0, 0, 55})) < 0.01f);
+    // The part of the wall that the ball had hidden is new in both.
+    CHECK(map.store.size() >= blocks);
+  }
+}
+
+TEST_CASE("a camera is on the map as far as index coordinates go") {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  CHECK(on_map(pose, 0.02, 4));
+  pose.translation().y() = 5.4e6;
+  CHECK(on_map(pose, 0.02, 4));
+  CHECK_FALSE(on_map(pose, 0.005, 4));
+  pose.translation().y() = -1e300;
+  CHECK_FALSE(on_map(pose, 0.02, 4));
 }

@@ -153,3 +153,28 @@ TEST_CASE("a merged weight does not pass the cap") {
   CHECK(merged.store[0].geometry->weight[0] == 255);
   CHECK(merged.store[0].geometry->tsdf[0] == Approx(0.03));
 }
+
+TEST_CASE("evidence beyond the cap is brought down to it, all classes of a voxel alike") {
+  Map a = fused(0, 2), b = fused(1, 2);
+  add_labels(a, 1);
+  add_labels(b, 2);
+  const Map* const pointers[] = {&a, &b};
+  const Map free = merge(pointers), capped = merge(pointers, {.max_evidence = 5});
+  size_t cut = 0, kept = 0;
+  for (const uint32_t n : free.store.sorted()) {
+    const Block& from = free.store[n];
+    const Block& to = *capped.store.get(from.coord);
+    REQUIRE(from.evidence.size() == to.evidence.size());
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      float before = 0, after = 0;
+      for (const EvidencePlane& e : from.evidence) before += e.counts->value[i];
+      for (const EvidencePlane& e : to.evidence) after += e.counts->value[i];
+      REQUIRE(after == Approx(std::min(before, 5.0f)));
+      for (size_t c = 0; c < from.evidence.size() && before > 0; ++c)
+        REQUIRE(to.evidence[c].counts->value[i] == Approx(from.evidence[c].counts->value[i] * after / before));
+      (before > 5 ? cut : kept) += before > 0;
+    }
+  }
+  CHECK(cut > 1000);
+  CHECK(kept > 1000);
+}

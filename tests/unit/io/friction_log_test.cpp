@@ -119,3 +119,65 @@ TEST_CASE("a log without what it takes says so") {
   for (int i = 0; i < 100; ++i) pressed += std::to_string(i * 0.01) + ",0,0,9\n";
   refused(pressed, settings, "sliding");
 }
+
+namespace {
+
+/// Pressed with 20 N from 1 s to `lift_s`, at 500 Hz, with F_t/F_n of `ratio(t)` and noise and an offset of the sensor.
+template <typename Ratio>
+ForceLog pressed_log(double lift_s, double idle_s, double noise_n, double offset_n, const Ratio& ratio) {
+  std::mt19937 rng(3);
+  std::normal_distribution<double> noise(0, noise_n);
+  ForceLog log;
+  for (int i = 0; double(i) * 0.002 < lift_s + 2 * idle_s; ++i) {
+    const double time = i * 0.002, t = time - idle_s;
+    const double load = t < 0 || t > lift_s ? 0 : 20 * std::min({1.0, t / 0.1, (lift_s - t) / 0.1});
+    log.time_s.push_back(time);
+    log.force_n.emplace_back(load * ratio(t) + noise(rng) + offset_n, noise(rng), load + noise(rng));
+  }
+  return log;
+}
+
+}  // namespace
+
+TEST_CASE("a foot that is pressed, or pulled and sticks, did not slide") {
+  const auto found = [](const ForceLog& log) {
+    CHECK_THROWS_WITH(friction_reading(log, {}), Catch::Contains("sliding: expected at least 16 samples of steady"));
+  };
+  found(pressed_log(3, 1, 0.1, 0, [](double) { return 0.0; }));
+  found(pressed_log(5, 1, 0.1, 0, [](double t) { return 0.08 * t; }));
+  found(pressed_log(4, 1, 0.05, 0, [](double t) { return t < 1 ? 0 : 0.15 * (t - 1); }));
+}
+
+TEST_CASE("what a sensor reads without contact is taken off") {
+  for (const double offset_n : {0.5, 1.0, -2.0}) {
+    const FrictionReading reading =
+        friction_reading(pressed_log(4, 1, 0.1, offset_n, [](double t) { return t < 1 ? 0.16 * t : 0.139; }), {});
+    INFO("offset " << offset_n);
+    CHECK(reading.kinetic_mean == Approx(0.139).epsilon(0.02));
+    CHECK(reading.static_peak == Approx(0.155).margin(0.01));
+    CHECK(reading.offset_n.x() == Approx(offset_n).margin(0.02));
+    CHECK(reading.offset_n.z() == Approx(0).margin(0.02));
+  }
+}
+
+TEST_CASE("touch-down, lift-off and long waiting leave the static peak alone") {
+  for (const double mu : {0.05, 0.3}) {
+    const FrictionReading reading =
+        friction_reading(pressed_log(4, 10, 0.5, 0, [&](double t) { return t < 1 ? 1.2 * mu * t : mu; }), {});
+    INFO("mu " << mu);
+    CHECK(reading.kinetic_mean == Approx(mu).margin(0.01));
+    CHECK(reading.static_peak == Approx(1.15 * mu).margin(0.02));
+  }
+}
+
+TEST_CASE("a slow pull before a short slide is no part of it") {
+  const ForceLog log = pressed_log(8.2, 0.5, 0.1, 0, [](double t) {
+    return t < 6 ? 0.36 * t / 6 : t < 6.05 ? 0.36 - (t - 6) * 1.2 : 0.3;
+  });
+  const FrictionReading reading = friction_reading(log, {});
+  CHECK(reading.kinetic_mean == Approx(0.3).epsilon(0.02));
+  CHECK(reading.kinetic_sd < 0.02);
+  CHECK(log.time_s[reading.slide_begin] > 6.5);
+  CHECK(reading.static_peak > 0.34);
+  CHECK(log.time_s[reading.peak] == Approx(6.5).margin(0.1));
+}

@@ -60,7 +60,7 @@ TEST_CASE("every problem of a property file is named at once with its line") {
       "  priors: {ice: {mean: 0.5, sd: -1}}\n";
   const std::string message = message_of(text);
   for (const char* expected : {"p.yaml:2", "p.yaml:3", "p.yaml:5", "p.yaml:6", "p.yaml:7", "lo < hi",
-                               "both mean and sd", "sd: expected a positive number, found -1"})
+                               "both mean and sd", "sd: expected a number from 1e-15 to 1e15, found -1"})
     CHECK_THAT(message, Catch::Contains(expected));
 }
 

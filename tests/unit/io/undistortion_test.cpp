@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "io/images/image_encode.h"
 #include "io/sequence/open_sequence.h"
+#include "io/sequence/registration.h"
 #include "tests/support/data.h"
 #include "tests/support/recorded_sequence.h"
 
@@ -146,4 +147,33 @@ TEST_CASE("calibration that is no lens or no transform is refused by name") {
              "T_body_camera: [2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]\n");
   CHECK_THROWS_WITH(open_sequence(folder.path()),
                     Catch::Contains("distortion") && Catch::Contains("T_body_camera") && Catch::Contains("rigid"));
+}
+
+TEST_CASE("what the colour camera sees another surface before takes no colour") {
+  // A plate at 1 m before a wall at 3 m; the colour camera stands 20 cm to the right and sees the plate 20 pixels
+  // farther left than the depth camera does, the wall 6.7.
+  const PinholeCamera camera{100, 100, 49.5, 19.5, 100, 40};
+  DepthImage depth_m(100, 40, 3.0f);
+  Image<uint16_t> labels(100, 40, 7);
+  for (int v = 0; v < 40; ++v)
+    for (int u = 0; u < 100; ++u) {
+      if (u >= 50 && u < 70) depth_m(u, v) = 1;
+      if (u >= 30 && u < 50) labels(u, v) = 9;
+    }
+  Eigen::Matrix4d T = Eigen::Matrix4d::Identity();
+  T(0, 3) = -0.2;
+  const Image<uint16_t> registered = registered_to_depth<uint16_t>(labels, camera, depth_m, camera, T, 0);
+  for (int u = 7; u < 100; ++u) {
+    INFO("column " << u);
+    const bool plate = u >= 50 && u < 70;
+    const double in_color = plate ? u - 20 : u - 20.0 / 3;
+    const bool hidden = !plate && in_color >= 30 && in_color < 49.5;
+    // At the plate's edges a cell holds both.
+    const bool at_edge = !plate && (std::abs(in_color - 29.5) < 2.5 || std::abs(in_color - 49.5) < 2.5);
+    const int found = registered(u, 20);
+    if (at_edge)
+      CHECK((found == 0 || found == 7));
+    else
+      CHECK(found == (plate ? 9 : hidden ? 0 : 7));
+  }
 }

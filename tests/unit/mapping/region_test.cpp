@@ -333,3 +333,31 @@ TEST_CASE("two rooms that a narrow bridge joins are reported as a neck") {
   REQUIRE(region.contains({-20, 0, 0}));
   CHECK(summarize(map, region, settings).necks == 1);
 }
+
+TEST_CASE("the class limit of a region is a ratio of beliefs, whatever the prior") {
+  // Forty classes of prior 8/40: one observation of 0.8 is four times the prior.
+  std::vector<std::string> names;
+  for (int c = 0; c < 40; ++c) names.push_back("class " + std::to_string(c));
+  const Map map = labelled_map(
+      kVoxel, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); }, class_table(names),
+      [](const Eigen::Vector3d& p) { return p.x() < 0 ? 0 : 1; }, 0.8f);
+  const auto farthest = [&](double ratio) {
+    RegionSettings settings;
+    settings.class_ratio = ratio;
+    const Region region = find_region(map, find_contact(map, {-0.2, 0, 0}, settings), settings);
+    int x = -100;
+    for (const Index3& v : voxels_of(region)) x = std::max(x, v.x);
+    return x;
+  };
+  // On the other side: 0.2 against 1.
+  CHECK(farthest(0.5) < 0);
+  CHECK(farthest(0.21) < 0);
+  CHECK(farthest(0.19) > 10);
+}
+
+TEST_CASE("a surface observed too little to be touched is said to be one") {
+  const Map map = room_corner([](const Eigen::Vector3d&) { return 0; });
+  RegionSettings settings;
+  settings.min_weight = 6;  // the map's weights are 5
+  CHECK_THROWS_WITH(find_contact(map, {0, 0, 0}, settings), Catch::Contains("found surface of weight 5, least 6"));
+}

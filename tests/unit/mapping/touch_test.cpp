@@ -64,6 +64,18 @@ void another_frame(Map& map, int slot) {
       }
 }
 
+/// By voxel of the region, in canonical order, one voxel at a time.
+std::vector<int> strongest_classes(const Map& map, const Region& region) {
+  Beliefs beliefs(map);
+  std::vector<int> strongest;
+  for (size_t b = 0; b < region.blocks(); ++b)
+    for_each_bit(region.mask[b], [&](int i) {
+      const Index3 f = first_voxel(region.coord[b]), v = voxel_of_offset(i);
+      strongest.push_back(most_probable_class(beliefs.at({f.x + v.x, f.y + v.y, f.z + v.z}).class_probability));
+    });
+  return strongest;
+}
+
 double expected_friction(Beliefs& beliefs, const Index3& voxel) { return *mean(beliefs.at(voxel).next_reading[0]); }
 
 }  // namespace
@@ -346,4 +358,39 @@ TEST_CASE("a merged map holds the touches of both maps") {
   const Block& block = *merged.store.get(block_of_voxel({-10, 0, 0}));
   REQUIRE(block.touch.size() == 1);
   CHECK(block.touch[0].n->value[offset_in_block({-10, 0, 0})] == 2);
+}
+
+TEST_CASE("a batch of touches says and leaves what they say and leave one by one") {
+  for (const bool mixed : {false, true}) {
+    Map one_by_one = two_floors(snow, wood, 3), together = two_floors(snow, wood, 3);
+    std::mt19937 rng(mixed ? 2 : 1);
+    std::uniform_real_distribution<double> place(-0.2, 0.2), value(0.1, 0.6);
+    TouchBatch batch(together);
+    uint64_t relabelled = 0;
+    for (int n = 0; n < 12; ++n) {
+      // Spheres that overlap in all ways, stamps in no order.
+      TouchRequest request = reading(place(rng), place(rng), value(rng), double(n * 7 % 12),
+                                     mixed && n % 3 == 1 ? TouchModel::mixture : TouchModel::material);
+      request.region.rule = RegionRule::sphere;
+      request.region.radius_m = 0.06 + 0.02 * (n % 4);
+      request.sigma = n % 2 == 0 ? 0 : 0.05;
+      const Touch touch = resolve_touch(one_by_one, request);
+      const std::vector<int> before = strongest_classes(one_by_one, touch.region);
+      const TouchEffect alone = apply_touch(one_by_one, touch), in_batch = batch.apply(touch);
+      const std::vector<int> after = strongest_classes(one_by_one, touch.region);
+      uint64_t changed = 0;
+      for (size_t i = 0; i < before.size(); ++i) changed += before[i] != after[i];
+      INFO("touch " << n);
+      CHECK(alone.relabelled == changed);
+      CHECK(in_batch.relabelled == changed);
+      CHECK(in_batch.id == alone.id);
+      CHECK(in_batch.refused == alone.refused);
+      CHECK(in_batch.before.class_probability == alone.before.class_probability);
+      CHECK(in_batch.after.class_probability == alone.after.class_probability);
+      relabelled += changed;
+    }
+    batch.finish();
+    CHECK(relabelled > 100);
+    CHECK(map_hash(together) == map_hash(one_by_one));
+  }
 }
