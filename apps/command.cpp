@@ -58,6 +58,12 @@ CLI::App& add_command(CLI::App& app, const CommandText& text, CommonOptions& com
   return command;
 }
 
+CLI::Option* add_switch(CLI::App& command, const std::string& names, std::optional<bool>& value,
+                        const std::string& text) {
+  return command.add_flag_function(
+      names, [&value](int64_t count) { value = count > 0; }, text);
+}
+
 void print_json(const nlohmann::ordered_json& document) { std::printf("%s\n", json_text(document, 2).c_str()); }
 
 }  // namespace felt::apps

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 
 namespace felt::apps {
@@ -29,6 +30,11 @@ struct CommandText {
 /// and the number of threads are set up and `run` is called; its return value is the exit code. Errors leave `run` as
 /// exceptions (core/error.h).
 CLI::App& add_command(CLI::App& app, const CommandText& text, CommonOptions& common, std::function<int()> run);
+
+/// A flag that is absent, not false, where it is not given, so that it overrules what a file says only where it is:
+/// `names` as CLI11 takes them ("--x,!--no-x"); --x=false is false.
+CLI::Option* add_switch(CLI::App& command, const std::string& names, std::optional<bool>& value,
+                        const std::string& text);
 
 /// A document on stdout, indented.
 void print_json(const nlohmann::ordered_json& document);

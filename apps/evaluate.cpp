@@ -8,6 +8,7 @@
 #include "apps/evaluation_report.h"
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
+#include "apps/output_files.h"
 #include "apps/progress.h"
 #include "apps/touch_options.h"
 #include "core/error.h"
@@ -64,13 +65,20 @@ void read_cameras(EvaluateCommand& command) {
   }
   SequenceOptions options;
   options.read_color = options.read_instances = false;
+  options.format = command.format;
   if (command.intrinsics->count() > 0) options.intrinsics = parse_intrinsics(command.camera.intrinsics, "--intrinsics");
+  if (!command.frames.empty()) options.frames = parse_frame_selection(command.frames, "--frames");
   const auto sequence = open_sequence(command.trajectory, options);
   cameras.camera = sequence->info().camera;
   for (int64_t i = 0; i < sequence->size(); ++i) {
     const ReadResult result = sequence->read(i);
     if (const auto* frame = std::get_if<Frame>(&result)) cameras.T_world_camera.push_back(frame->T_world_camera);
   }
+}
+
+/// The evaluated mesh may carry the labels under the reference's name or, as ours do, at its vertices.
+std::string label_name_in(const TriangleMesh& mesh, const std::string& label_name) {
+  return TriangleMesh::find(mesh.triangle_scalars, label_name) != nullptr ? label_name : kVertexLabels;
 }
 
 /// Scores of a sequence's labels with the classes they are over.
@@ -95,7 +103,7 @@ SequenceLabels evaluate_sequence_labels(const EvaluateCommand& command, const Ev
   if (evaluated.map)
     caster.emplace(*evaluated.map), beliefs.emplace(*evaluated.map);
   else
-    mesh.emplace(*evaluated.mesh, command.label_name.empty() ? "label" : command.label_name, command.input);
+    mesh.emplace(*evaluated.mesh, label_name_in(*evaluated.mesh, command.label_name), command.input);
   SequenceLabels result{LabelScores(classes.size()), classes, {}};
   ProgressBar progress("frames", sequence->size(), !command.common.quiet);
   for (int64_t i = 0; i < sequence->size(); ++i) {
@@ -119,8 +127,12 @@ SequenceLabels evaluate_sequence_labels(const EvaluateCommand& command, const Ev
     add_view(result.scores, prediction, {&frame.labels, &frame.depth_m, command.cameras.min_depth_m, max_depth_m},
              slots, command.class_images);
   }
-  if (result.scores.views == 0)
-    throw FormatError(describe_mismatch(command.reference_labels, "frames", "at least one with labels", "none"));
+  if (result.scores.views == 0) {
+    std::string found = "none";
+    for (const auto& [reason, frames] : result.skipped)
+      found.append(found == "none" ? ": " : ", ").append(std::to_string(frames) + " " + reason);
+    throw FormatError(describe_mismatch(command.reference_labels, "frames", "at least one with labels", found));
+  }
   return result;
 }
 
@@ -138,8 +150,9 @@ LabelScores evaluate_mesh_labels(const EvaluateCommand& command, const Evaluated
   if (evaluated.map)
     add_surface(scores, *evaluated.map, VoxelBeliefs(*evaluated.map), labelled, slots, command.geometry, cameras);
   else
-    add_surface(scores, LabelledMesh(*evaluated.mesh, command.label_name, command.input), slots, labelled, slots,
-                command.geometry, cameras);
+    add_surface(scores,
+                LabelledMesh(*evaluated.mesh, label_name_in(*evaluated.mesh, command.label_name), command.input), slots,
+                labelled, slots, command.geometry, cameras);
   return scores;
 }
 
@@ -204,6 +217,14 @@ void check(const EvaluateCommand& c) {
        "--reference-mesh, --reference-labels or --reference-readings");
   need(c.reliability.empty() || !c.reference_labels.empty() || !c.label_name.empty(), "--reliability",
        "--reference-labels, or --reference-mesh with --label-name");
+  const bool of_sequence = !c.reference_labels.empty() || fs::is_directory(c.trajectory);
+  need(c.frames.empty() || of_sequence, "--frames", "--reference-labels or --trajectory SEQUENCE");
+  need(c.format.empty() || of_sequence, "--format", "--reference-labels or --trajectory SEQUENCE");
+  need(!fs::is_regular_file(c.trajectory) || c.intrinsics->count() > 0, "--trajectory FILE", "--intrinsics and --size");
+  need(c.trajectory.empty() || !c.reference_mesh.empty(), "--trajectory", "--reference-mesh");
+  need(c.properties.empty() || !c.reference_readings.empty(), "--properties", "--reference-readings");
+  need(c.label_name.empty() || !c.reference_mesh.empty() || !c.reference_labels.empty(), "--label-name",
+       "--reference-mesh or --reference-labels");
   const bool is_map = fs::path(c.input).extension() == ".vdb";
   need(c.reference_readings.empty() || is_map, "--reference-readings", "a map (.vdb)");
   need(!c.class_images || (is_map && !c.reference_labels.empty()), "--class-images",
@@ -273,6 +294,7 @@ int evaluate(EvaluateCommand& command) {
   if (!command.reliability.empty()) {
     if (!calibration || calibration->count() == 0)
       throw ConfigError(describe_mismatch("--reliability", "class probabilities", "a map with classes", "none"));
+    require_ending(command.reliability, ".svg");
     write_plot_svg(command.reliability, reliability_plots(*calibration), 2);
     json["reliability"] = command.reliability;
   }
@@ -310,7 +332,8 @@ void add_evaluate(CLI::App& app) {
       ->capture_default_str()
       ->group(geometry);
   sub.add_option("--trajectory", command.trajectory,
-                 "Recorded sequence, or a file with one pose a line: only what it saw of the reference counts")
+                 "Recorded sequence (its --frames), or a file with one pose a line: only what it saw of the reference "
+                 "counts")
       ->group(geometry);
   sub.add_flag("--cull-reconstruction", command.geometry.cull_reconstruction,
                "Leave out what the trajectory did not see of the reconstruction, too")

@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -47,8 +48,12 @@ void check(const ExportOptions& o) {
   if (!o.box_m.empty() && !(o.box_m[0] < o.box_m[3] && o.box_m[1] < o.box_m[4] && o.box_m[2] < o.box_m[5]))
     problems.push_back(describe_mismatch("--box", "corners in metres", "x0,y0,z0,x1,y1,z1 with x0 < x1 and so on",
                                          nlohmann::json(o.box_m).dump()));
-  if (!o.mesh.empty() && o.mesh == o.points)
-    problems.push_back(describe_mismatch("--points", "file", "another one than --mesh", o.points.string()));
+  std::map<fs::path, std::string> uses = {{fs::weakly_canonical(o.map), "the map that is read"}};
+  for (const auto& [option, file] :
+       {std::pair("--vdb", o.vdb), {"--mesh", o.mesh}, {"--points", o.points}, {"--html", o.html}})
+    if (!file.empty())
+      if (const auto [other, is_new] = uses.emplace(fs::weakly_canonical(file), option); !is_new)
+        problems.push_back(describe_mismatch(option, "file", "another one than " + other->second, file.string()));
   if (!problems.empty()) throw ConfigError(problems);
   for (const fs::path& file : {o.vdb, o.mesh, o.points, o.html})
     if (!file.empty()) require_no_file(file, o.overwrite);
@@ -106,6 +111,7 @@ json write_surface(const Map& map, const Region* part, const ExportOptions& o) {
     mesh = felt::part_of(mesh, [&](const Triangle& t) { return inside[t[0]] && inside[t[1]] && inside[t[2]]; });
   }
   json written = json::object();
+  warn_if_coarse(mesh, !o.mesh.empty() ? o.mesh : !o.points.empty() ? o.points : o.html);
   if (!o.mesh.empty()) {
     write_mesh(o.mesh, mesh);
     written["mesh"] = {

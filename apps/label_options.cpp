@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "apps/command.h"
 #include "apps/number_checks.h"
 #include "core/error.h"
 #include "io/files/content_hash.h"
@@ -50,11 +51,7 @@ void add_label_options(CLI::App& command, LabelSettings& s) {
                   "Names, such as person: their pixels neither label nor build surface")
       ->delimiter(',')
       ->group(group);
-  // A callback, because a flag bound to an optional is false, not absent, where it is not given.
-  command
-      .add_flag_callback(
-          "--instances", [&s] { s.instances = true; }, "Keep the instance id of every voxel")
-      ->group(group);
+  add_switch(command, "--instances", s.instances, "Keep the instance id of every voxel")->group(group);
 }
 
 LabelConfig standard_labels() {

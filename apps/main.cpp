@@ -55,9 +55,19 @@ int written(int code) {
   return fail(kInputOutput, "standard output: cannot be written");
 }
 
+/// The first word that gives an option nothing ("--out="), as a shell makes of a variable that is not set: CLI11 would
+/// take the next word for the value.
+std::string option_without_value(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i)
+    if (const std::string word = argv[i]; word.starts_with("--") && word.ends_with('=')) return word;
+  return "";
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Dense volumetric mapping that knows what things are and how they feel", "feltmap");
   add_commands(app);
+  if (const std::string word = option_without_value(argc, argv); !word.empty())
+    return fail(kUsage, "'" + word + "': expected a value, found none (see feltmap --help)");
   try {
     app.parse(argc, argv);
     return written(kDone);

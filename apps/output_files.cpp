@@ -1,10 +1,13 @@
 #include "apps/output_files.h"
 
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <set>
 
 #include "core/error.h"
@@ -77,6 +80,24 @@ void require_nothing_lost(const fs::path& file, const Map& replacement, bool tou
   }
   if (!lost.empty())
     throw IoError(describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", lost));
+}
+
+void require_ending(const fs::path& file, const std::string& ending) {
+  if (file.extension() != ending && fs::is_regular_file(file))
+    throw ConfigError(describe_mismatch(file.string(), "picture", "a name that ends with " + ending,
+                                        "another file, which would be replaced"));
+}
+
+void warn_if_coarse(const TriangleMesh& mesh, const fs::path& file) {
+  float farthest = 0;
+  for (const Eigen::Vector3f& p : mesh.positions) farthest = std::max(farthest, p.cwiseAbs().maxCoeff());
+  const float step_m = std::nextafter(farthest, std::numeric_limits<float>::infinity()) - farthest;
+  constexpr float kMillimetre = 0.001f;
+  if (step_m > kMillimetre)
+    spdlog::warn(
+        "{}: coordinates up to {:.0f} m are kept to {:.3g} m in the 32-bit floats of meshes; the map itself is exact. "
+        "Subtract an offset from the poses for a mesh that is, too",
+        file.string(), farthest, step_m);
 }
 
 MapWriting::MapWriting(const fs::path& file)

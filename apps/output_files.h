@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/mesh.h"
 #include "io/files/file_lock.h"
 #include "mapping/map.h"
 
@@ -21,6 +22,12 @@ void require_no_file(const std::filesystem::path& file, bool overwrite);
 /// with the same settings, and (`touches_too`) its touches that count: throws IoError where it is no map, or one that
 /// holds more, unless `overwrite`.
 void require_nothing_lost(const std::filesystem::path& file, const Map& replacement, bool touches_too, bool overwrite);
+
+/// For pictures, which may be replaced: throws ConfigError where the file exists and its name does not end so.
+void require_ending(const std::filesystem::path& file, const std::string& ending);
+
+/// Warns where the coordinates of a mesh are so large that 32-bit floats lose more than a millimetre.
+void warn_if_coarse(const TriangleMesh& mesh, const std::filesystem::path& file);
 
 /// Keeps other commands from a map file, and runs of reconstruct from its folder, while it is replaced by what is made
 /// of it. Waits for other commands up to a minute. Half-written files of commands that were killed are removed. Throws

@@ -1,7 +1,10 @@
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -36,8 +39,8 @@ json instance_json(const Block& block, int offset) {
   return {{"id", block.instance->id[offset]}, {"votes", block.instance->votes[offset]}};
 }
 
-json answer(const Map& map, Beliefs& beliefs, const Eigen::Vector3d& point, std::optional<double> below,
-            bool instances) {
+/// What is known of a point without beliefs; `voxel`: the observed voxel whose belief is to be added, if there is one.
+json geometry_json(const Map& map, const Eigen::Vector3d& point, bool instances, std::optional<Index3>& voxel) {
   json out;
   out["point_m"] = point_json(point);
   const Eigen::Vector3d q = point / map.voxel_size_m;
@@ -45,10 +48,10 @@ json answer(const Map& map, Beliefs& beliefs, const Eigen::Vector3d& point, std:
     out["reason"] = "not a point of a map";
     return out;
   }
-  const Index3 voxel{int32_t(std::lround(q.x())), int32_t(std::lround(q.y())), int32_t(std::lround(q.z()))};
-  const Block* block = map.store.get(block_of_voxel(voxel));
-  const float weight = block == nullptr ? 0.0f : block->geometry->weight[offset_in_block(voxel)];
-  out["voxel"] = {voxel.x, voxel.y, voxel.z};
+  const Index3 at{int32_t(std::lround(q.x())), int32_t(std::lround(q.y())), int32_t(std::lround(q.z()))};
+  const Block* block = map.store.get(block_of_voxel(at));
+  const float weight = block == nullptr ? 0.0f : block->geometry->weight[offset_in_block(at)];
+  out["voxel"] = {at.x, at.y, at.z};
   out["weight"] = weight;
   if (!(weight > 0)) {
     out["signed_distance_m"] = nullptr;
@@ -56,10 +59,52 @@ json answer(const Map& map, Beliefs& beliefs, const Eigen::Vector3d& point, std:
     return out;
   }
   const double trilinear = double(sample_tsdf(map, point.x(), point.y(), point.z()));
-  out["signed_distance_m"] = std::isnan(trilinear) ? double(block->geometry->tsdf[offset_in_block(voxel)]) : trilinear;
-  out.update(belief_json(map, beliefs.at(voxel), below));
-  if (instances) out["instance"] = instance_json(*block, offset_in_block(voxel));
+  out["signed_distance_m"] = std::isnan(trilinear) ? double(block->geometry->tsdf[offset_in_block(at)]) : trilinear;
+  if (instances) out["instance"] = instance_json(*block, offset_in_block(at));
+  voxel = at;
   return out;
+}
+
+/// What the properties of a belief are computed from: equal numbers, equal answer.
+std::vector<double> forecast_of(const Belief& belief) {
+  std::vector<double> numbers = belief.readings;
+  for (const StudentTMixture& next : belief.next_reading) {
+    numbers.push_back(double(next.weight.size()));
+    for (size_t c = 0; c < next.weight.size(); ++c)
+      numbers.insert(numbers.end(),
+                     {next.weight[c], next.component[c].location, next.component[c].scale2, next.component[c].dof});
+  }
+  return numbers;
+}
+
+/// Answers in the order of the points. Quantiles take most of the time: each distinct forecast is asked for once, all
+/// in parallel.
+std::vector<json> answers(const Map& map, const std::vector<Eigen::Vector3d>& points, std::optional<double> below) {
+  const bool instances = has_instances(map);
+  Beliefs beliefs(map);
+  std::vector<json> all;
+  std::map<std::vector<double>, size_t> number;  // of a forecast
+  std::vector<Belief> distinct;
+  std::vector<std::optional<size_t>> forecast;
+  for (const Eigen::Vector3d& point : points) {
+    std::optional<Index3> voxel;
+    json out = geometry_json(map, point, instances, voxel);
+    forecast.emplace_back();
+    if (voxel) {
+      Belief belief = beliefs.at(*voxel);
+      out.update(class_json(map, belief));
+      const auto [at, is_new] = number.emplace(forecast_of(belief), distinct.size());
+      forecast.back() = at->second;
+      if (is_new) distinct.push_back(std::move(belief));
+    }
+    all.push_back(std::move(out));
+  }
+  std::vector<json> properties(distinct.size());
+  tbb::parallel_for(size_t(0), distinct.size(),
+                    [&](size_t i) { properties[i] = properties_json(map, distinct[i], below); });
+  for (size_t i = 0; i < all.size(); ++i)
+    if (forecast[i]) all[i]["properties"] = properties[*forecast[i]];
+  return all;
 }
 
 int run_query(const QueryOptions& options) {
@@ -69,10 +114,7 @@ int run_query(const QueryOptions& options) {
   for (const std::string& at : options.at) points.push_back(point_of(at));
   if (!options.file.empty())
     for (const Eigen::Vector3d& p : read_points(options.file)) points.push_back(p);
-  Beliefs beliefs(map);
-  const bool instances = has_instances(map);
-  json all = json::array();
-  for (const Eigen::Vector3d& point : points) all.push_back(answer(map, beliefs, point, options.below, instances));
+  const std::vector<json> all = answers(map, points, options.below);
   if (options.json) {
     print_json(json{{"points", all}});
     return kDone;
@@ -85,7 +127,9 @@ int run_query(const QueryOptions& options) {
       continue;
     }
     std::printf("distance %.4f m, weight %g", a["signed_distance_m"].get<double>(), a["weight"].get<double>());
-    if (a.contains("class"))
+    if (a.contains("class") && !(a["class_evidence"].get<double>() > 0))
+      std::printf(", class unknown: no label was seen there");
+    else if (a.contains("class"))
       std::printf(", %s %.3f, entropy %.3f", a["class"].get<std::string>().c_str(),
                   a["class_probability"][a["class"].get<std::string>()].get<double>(),
                   a["class_entropy"].get<double>());

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 
+#include "apps/command.h"
 #include "core/error.h"
 #include "io/sequence/pose_list.h"
 
@@ -18,17 +19,8 @@ void add_reading_options(CLI::App& command, ReadingArguments& a) {
   command.add_option("--depth-scale", a.depth_scale, "Stored depth units per metre")->group(reading);
   command.add_option("--depth-encoding", a.depth_encoding, "plain, or rotated3 (16 bits rotated left by 3)")
       ->group(reading);
-  // Callbacks, because a flag bound to an optional is false, not absent, where it is not given: it would overrule what
-  // the sequence says of itself.
-  command
-      .add_flag_callback(
-          "--ray-length", [&a] { a.ray_length = true; }, "Depth is the length of the ray, not z")
+  add_switch(command, "--ray-length,!--no-ray-length", a.ray_length, "Depth is the length of the ray, not z")
       ->group(reading);
-  command
-      .add_flag_callback(
-          "--no-ray-length", [&a] { a.ray_length = false; }, "Depth is z, whatever the sequence says")
-      ->group(reading)
-      ->excludes("--ray-length");
   command.add_option("--pose-convention", a.pose_convention, "c2w or w2c, opencv or opengl; for example w2c,opengl")
       ->group(reading);
   command
@@ -46,8 +38,8 @@ void add_reading_options(CLI::App& command, ReadingArguments& a) {
                   "Folder of class probability images (docs/semantics.md), or of confidences beside --labels")
       ->group(reading);
   command.add_option("--classes", a.classes, "Class table (classes.yaml, or a CSV of id and name)")->group(reading);
-  command.add_flag("--bgr", a.bgr, "Colour images hold red and blue exchanged")->group(reading);
-  command.add_flag("--no-color", a.no_color, "Do not read colour images")->group(reading);
+  add_switch(command, "--bgr", a.bgr, "Colour images hold red and blue exchanged")->group(reading);
+  add_switch(command, "--no-color", a.no_color, "Do not read colour images")->group(reading);
 }
 
 SequenceOptions resolve(const ReadingArguments& a, SequenceOptions reading, std::vector<std::string>& problems) {
@@ -82,8 +74,8 @@ SequenceOptions resolve(const ReadingArguments& a, SequenceOptions reading, std:
   if (a.max_dt_s) reading.max_dt_s = *a.max_dt_s;
   if (a.stamp_offset) reading.pose_stamp_offset = *a.stamp_offset;
   if (a.label_offset != 0) reading.label_offset = a.label_offset;
-  reading.bgr |= a.bgr;
-  reading.read_color &= !a.no_color;
+  if (a.bgr) reading.bgr = *a.bgr;
+  if (a.no_color) reading.read_color = !*a.no_color;
   const auto expect = [&](bool good, const std::string& where, const std::string& what, double found) {
     if (!good) problems.push_back(describe_mismatch(where, what, "a number above 0", std::to_string(found)));
   };

@@ -15,8 +15,7 @@ struct ReadingArguments {
   std::string format, intrinsics, pose_convention, depth_encoding, frames;
   std::filesystem::path labels, probs, classes;
   std::optional<double> depth_scale, max_dt_s;
-  std::optional<bool> ray_length;
-  bool no_color = false, bgr = false;
+  std::optional<bool> ray_length, no_color, bgr;
   std::optional<double> stamp_offset;
   std::string distortion, body_camera;
   int label_offset = 0;

@@ -150,6 +150,7 @@ void write_results(const Map& map, const std::function<std::string()>& save, con
     std::vector<VertexEdge> edges;
     TriangleMesh mesh = extract_mesh(map, {}, &edges);
     attach_beliefs(map, edges, mesh);
+    warn_if_coarse(mesh, folder / kMeshName);
     write_ply(folder / kMeshName, mesh);
     report.mesh_vertices = mesh.positions.size();
     report.mesh_triangles = mesh.triangles.size();
@@ -159,6 +160,27 @@ void write_results(const Map& map, const std::function<std::string()>& save, con
   }
   saving.get();
   if (mesh_failure) std::rethrow_exception(mesh_failure);
+}
+
+/// What a run left out although it was asked for.
+void warn_of_losses(const FusionRecord& fusion, const IntegrationConfig& config, const Map& map) {
+  if (!fusion.unknown_ids.empty()) {
+    constexpr size_t kNamed = 8;
+    std::string ids;
+    uint64_t pixels = 0;
+    size_t named = 0;
+    for (const auto& [id, count] : fusion.unknown_ids) {
+      pixels += count;
+      if (++named <= kNamed) ids.append(ids.empty() ? "" : ", ").append(std::to_string(id));
+    }
+    if (named > kNamed) ids += " and " + std::to_string(named - kNamed) + " more";
+    spdlog::warn("labels that the class table does not know, not fused: {} ({} pixels){}", ids, pixels,
+                 fusion.labels.voxels == 0 ? "; no voxel has a label: is it the table of these images?" : "");
+  }
+  const bool any_instance = std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
+                                        [](const Block& block) { return block.instance != nullptr; });
+  if (config.labels.instances && fusion.fused > 0 && !any_instance)
+    spdlog::warn("--instances: expected frames with instance images, found none");
 }
 
 void print_summary(const ReconstructReport& report, const fs::path& folder) {
@@ -175,11 +197,6 @@ void print_summary(const ReconstructReport& report, const fs::path& folder) {
                                            .c_str());
   for (const auto& [reason, count] : fusion.skipped)
     std::printf("  skipped %lld: %s\n", static_cast<long long>(count), reason.c_str());
-  if (!fusion.unknown_ids.empty()) {
-    std::string ids;
-    for (const auto& [id, pixels] : fusion.unknown_ids) ids += (ids.empty() ? "" : ", ") + std::to_string(id);
-    std::printf("  labels that the class table does not know, not fused: %s\n", ids.c_str());
-  }
   if (fusion.labels.invalid > 0)
     std::printf("  %llu observations of probabilities that are no distribution, not fused\n",
                 static_cast<unsigned long long>(fusion.labels.invalid));
@@ -231,7 +248,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   check_memory(*sequence, options);
   for (const std::string& note : sequence->info().notes) spdlog::warn("{}", note);
   for (const Finding& fault : faults.get())
-    spdlog::warn("{}: {} ({}); try {}, and see feltmap doctor", fault.topic, fault.belief, fault.evidence,
+    spdlog::warn("{}: {} ({}); mend: {} (feltmap doctor tells more)", fault.topic, fault.belief, fault.evidence,
                  fault.remedy);
   sequence = perceived_sequence(std::move(sequence), perception);
 
@@ -302,6 +319,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   if (report.mesh_triangles == 0)
     spdlog::warn("the map holds no surface: is there depth between {} and {} m, and are voxels of {} m small enough?",
                  options.fusion.min_depth_m, options.fusion.max_depth_m, options.voxel_size_m);
+  warn_of_losses(report.fusion, options.fusion, map);
   if (common.json) {
     std::fputs(json.c_str(), stdout);
   } else if (!common.quiet) {

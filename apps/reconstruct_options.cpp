@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "apps/command.h"
 #include "apps/label_options.h"
 #include "apps/number_checks.h"
 #include "core/error.h"
@@ -107,7 +108,7 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
       ->transform(CLI::CheckedTransformer(kWeights).description(""))
       ->group(map);
   command.add_option("--max-weight", a.max_weight, "Cap of a voxel's summed weight")->group(map);
-  command.add_flag("--carve", a.carve, "Let free space seen later erase what stood there")->group(map);
+  add_switch(command, "--carve", a.carve, "Let free space seen later erase what stood there")->group(map);
 
   add_reading_options(command, a.reading);
   const char* reading = "Sequence (found in it, or the layout's default, unless given)";
@@ -179,7 +180,7 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   choose(fusion.color_band_vox, std::nullopt, file.color_band_vox);
   fusion.distance = a.distance.value_or(file.distance.value_or(fusion.distance));
   fusion.weight = a.weight.value_or(file.weight.value_or(fusion.weight));
-  fusion.carve = a.carve || file.carve.value_or(fusion.carve);
+  fusion.carve = a.carve.value_or(file.carve.value_or(fusion.carve));
   problems.expect(std::isfinite(fusion.min_depth_m) && fusion.min_depth_m >= 0, "--min-depth", "metres",
                   "a number of at least 0", text_of(fusion.min_depth_m));
   problems.expect(std::isfinite(fusion.max_depth_m) && fusion.max_depth_m > fusion.min_depth_m, "--max-depth", "metres",

@@ -42,7 +42,8 @@ struct ReconstructArguments {
   std::optional<WeightModel> weight;
   PerceptionArguments perception;
   LabelSettings label_settings;
-  bool carve = false, overwrite = false, resume = false;
+  std::optional<bool> carve;
+  bool overwrite = false, resume = false;
   int64_t checkpoint_every = 0;
 };
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "apps/run_settings.h"
+#include "apps/touch_options.h"
 #include "core/error.h"
 #include "io/files/text_input.h"
 #include "io/sequence/open_sequence.h"
@@ -44,7 +45,7 @@ TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& 
   const SequenceInfo& info = selected.info();
   TouchPlan plan;
   if (const auto& file = options.properties.empty() ? info.properties_file : options.properties; !file.empty())
-    plan.properties = read_properties(file);
+    plan.properties = read_properties(file), warn_of_misspelt_priors(plan.properties, classes, file.string());
   const bool named = !options.touches.empty();
   plan.file = named ? options.touches : info.touches_file;
   if (plan.file.empty()) return plan;

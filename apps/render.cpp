@@ -1,3 +1,5 @@
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -9,6 +11,7 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
+#include "apps/output_files.h"
 #include "apps/touch_options.h"
 #include "core/error.h"
 #include "io/map_file/map_file.h"
@@ -17,6 +20,7 @@
 #include "mapping/surface/marching_cubes.h"
 #include "mapping/surface/render.h"
 #include "mapping/surface/render_classes.h"
+#include "mapping/touch/touch_view.h"
 
 namespace felt::apps {
 namespace {
@@ -48,10 +52,12 @@ Eigen::Vector3d parse_up(const std::string& text) {
 struct PropertyImage {
   int property = 0;
   bool sd = false;
-  double low = 0, high = 1;  ///< range of its levels: of all classes' priors
+  double low = 0, high = 1;  ///< range of its levels: of all classes' priors and all touches
 };
 
-std::optional<PropertyImage> property_image_of(const Map& map, const std::string& name) {
+/// `touched`: the map's touch views.
+std::optional<PropertyImage> property_image_of(const Map& map, const std::vector<TouchView>& touched,
+                                               const std::string& name) {
   const size_t dot = name.rfind('.');
   if (dot == std::string::npos) return std::nullopt;
   const std::string what = name.substr(dot + 1);
@@ -60,10 +66,18 @@ std::optional<PropertyImage> property_image_of(const Map& map, const std::string
   PropertyImage image{*property, what == "sd", std::numeric_limits<double>::infinity(), 0};
   if (!image.sd) image.high = -image.low;
   for (const auto& [class_name, prior] : map.properties[*property].priors) {
-    // Means of mixtures lie between the classes'; readings may move them a little beyond.
+    // Means of mixtures lie between the classes'.
     image.low = std::min(image.low, image.sd ? 0 : prior.mean - prior.sd);
     image.high = std::max(image.high, image.sd ? 3 * prior.sd : prior.mean + prior.sd);
   }
+  // Touches may have taught anything.
+  for (const TouchView& view : touched)
+    for_each_bit(view.mask, [&](int i) {
+      const double value = double((image.sd ? view.sd : view.mean)[size_t(*property)][size_t(i)]);
+      if (!std::isfinite(value)) return;
+      image.low = std::min(image.low, value);
+      image.high = std::max(image.high, value);
+    });
   return image;
 }
 
@@ -80,13 +94,14 @@ bool names_images(const std::string& word) {
 /// Everything that the images of a view are made from.
 struct Source {
   const Map& map;
+  const std::vector<TouchView>& touched;
   RayCaster caster;
   VoxelBeliefs beliefs;
 };
 
-/// Writes the images of one pose and returns their names.
+/// Writes the images of one pose and returns their names. `too_far`: counts pixels whose depth 16 bits cannot hold.
 nlohmann::ordered_json write_view(const RenderCommand& command, const Source& source, const RenderedView& view,
-                                  size_t number) {
+                                  size_t number, int64_t& too_far) {
   char stem[32];
   std::snprintf(stem, sizeof stem, "%06zu", number);
   nlohmann::ordered_json names = nlohmann::ordered_json::array();
@@ -99,7 +114,7 @@ nlohmann::ordered_json write_view(const RenderCommand& command, const Source& so
       write_level_png(path_of(".png"), values, low, high);
       if (command.colored) write_png(path_of(".color.png"), felt::colored(values, low, high));
     };
-    if (image == "depth") write_depth_png(path_of(".png"), view.depth_m);
+    if (image == "depth") too_far += write_depth_png(path_of(".png"), view.depth_m);
     if (image == "normal") write_png(path_of(".png"), felt::colored(view.normal));
     if (image == "color") write_png(path_of(".png"), view.color);
     if (image == "class") {
@@ -111,9 +126,10 @@ nlohmann::ordered_json write_view(const RenderCommand& command, const Source& so
       const Image<float> entropy = entropy_image(source.beliefs, view.voxel);
       write_depth_png(path_of(".png"), entropy);
       if (command.colored)
-        write_png(path_of(".color.png"), felt::colored(entropy, 0, std::log(double(source.map.classes.size()))));
+        write_png(path_of(".color.png"),
+                  felt::colored(entropy, 0, std::log(double(std::max(2, source.map.classes.size())))));
     }
-    if (const auto property = property_image_of(source.map, image)) {
+    if (const auto property = property_image_of(source.map, source.touched, image)) {
       const PropertyImages values = property_images(source.beliefs, view.voxel, property->property);
       write_values(property->sd ? values.sd : values.mean, property->low, property->high);
     }
@@ -135,10 +151,11 @@ int render(const RenderCommand& command) {
     problems.push_back(describe_mismatch("render", "where to write", "--out DIR", "nothing"));
   Map map = load_map(command.map);
   use_properties(map, command.properties);
+  const std::vector<TouchView> touched = touch_views(map);
   nlohmann::ordered_json levels = nlohmann::ordered_json::object();
   for (const std::string& image : command.images) {
     const bool of_classes = image == "class" || image == "entropy";
-    const auto property = property_image_of(map, image);
+    const auto property = property_image_of(map, touched, image);
     if (of_classes && map.classes.empty())
       problems.push_back(describe_mismatch(command.map, "--images class, entropy", "a map with classes", "none"));
     if (property) levels[image] = {{"1", property->low}, {"65535", property->high}};
@@ -153,14 +170,21 @@ int render(const RenderCommand& command) {
   nlohmann::ordered_json json = {{"map", command.map}, {"views", nlohmann::ordered_json::array()}};
   if (!levels.empty()) json["levels"] = levels;
   if (!command.overview.empty()) {
+    require_ending(command.overview, ".png");
     write_png(command.overview, overview_picture(extract_mesh(map), parse_up(command.up)));
     json["overview"] = command.overview;
   }
   if (!poses.empty()) {
     fs::create_directories(command.out);
-    const Source source{map, RayCaster(map), VoxelBeliefs(map)};
+    const Source source{map, touched, RayCaster(map), VoxelBeliefs(map)};
+    int64_t too_far = 0;
     for (size_t i = 0; i < poses.size(); ++i)
-      json["views"].push_back(write_view(command, source, source.caster.render(camera, poses[i], command.options), i));
+      json["views"].push_back(
+          write_view(command, source, source.caster.render(camera, poses[i], command.options), i, too_far));
+    if (too_far > 0) {
+      spdlog::warn("{} pixels lie beyond 65.535 m, which is as far as 16 bits of millimetres go: they are 0", too_far);
+      json["depth_pixels_too_far"] = too_far;
+    }
   }
   if (command.common.json) {
     print_json(json);

@@ -65,6 +65,18 @@ std::vector<RecordedTouch> recorded_touches(const TouchOptions& options) {
   return {touch};
 }
 
+/// Classes that a reading says nothing of although they were believed in.
+std::vector<std::string> classes_without_prior(const Map& map, const TouchEffect& effect) {
+  constexpr double kNotable = 0.05;
+  const int property = *map.properties.index_of(map.touches.find(effect.id)->request.property);
+  const ClassPriors priors = class_priors(map.properties[property], map.classes);
+  std::vector<std::string> names;
+  for (int c = 0; c < map.classes.size(); ++c)
+    if (!priors.has_prior[size_t(c)] && effect.before.class_probability[size_t(c)] >= kNotable)
+      names.push_back(map.classes.at_slot(c).name);
+  return names;
+}
+
 json effect_json(const Map& map, const TouchEffect& effect, const RegionSettings& settings) {
   const Touch& touch = *map.touches.find(effect.id);
   const TouchRequest& r = touch.request;
@@ -82,6 +94,7 @@ json effect_json(const Map& map, const TouchEffect& effect, const RegionSettings
   out["region"] = summary_json(map, summarize(map, touch.region, settings));
   out["before"] = belief_json(map, effect.before, std::nullopt);
   out["after"] = belief_json(map, effect.after, std::nullopt);
+  out["without_prior"] = classes_without_prior(map, effect);
   out["relabelled_voxels"] = effect.relabelled;
   out["refused_voxels"] = effect.refused;
   out["tail_probability"] = effect.tail_probability;
@@ -104,6 +117,9 @@ void print_effect(const Map& map, const TouchEffect& effect, const RegionSetting
     std::printf("  %llu voxels kept their state: no valid projection\n",
                 static_cast<unsigned long long>(effect.refused));
   for (const std::string& warning : region.warnings) std::printf("  warning: %s\n", warning.c_str());
+  for (const std::string& name : classes_without_prior(map, effect))
+    std::printf("  warning: %s has no prior of %s: the other classes share what was believed of it\n", name.c_str(),
+                touch.request.property.c_str());
   if (effect.flags.surprising) std::printf("  warning: no class explains this reading\n");
   if (effect.flags.not_one_material) std::printf("  warning: the region may hold more than one material\n");
   if (effect.modes.size() > 1) {

@@ -1,7 +1,11 @@
 #include "apps/touch_options.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <numeric>
 #include <sstream>
 #include <utility>
 
@@ -136,18 +140,30 @@ std::optional<ViewMask> RegionOptions::view() const {
 
 json point_json(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z()}; }
 
-json belief_json(const Map& map, const Belief& belief, std::optional<double> below) {
-  json out;
+json class_json(const Map& map, const Belief& belief) {
+  json out = json::object();
   if (map.classes.size() > 0) {
     out["class"] = map.classes.at_slot(most_probable_class(belief.class_probability)).name;
     for (int c = 0; c < map.classes.size(); ++c)
       out["class_probability"][map.classes.at_slot(c).name] = belief.class_probability[size_t(c)];
     out["class_entropy"] = class_entropy(belief.class_probability);
+    const double all = std::accumulate(belief.concentration.begin(), belief.concentration.end(), 0.0);
+    out["class_evidence"] = std::max(0.0, all - map.classes.prior_total());
   }
-  out["properties"] = json::object();
+  return out;
+}
+
+json properties_json(const Map& map, const Belief& belief, std::optional<double> below) {
+  json out = json::object();
   for (int p = 0; p < map.properties.size(); ++p)
-    out["properties"][map.properties[p].name] =
+    out[map.properties[p].name] =
         property_json(belief.next_reading[size_t(p)], map.properties[p], belief.readings[size_t(p)], below);
+  return out;
+}
+
+json belief_json(const Map& map, const Belief& belief, std::optional<double> below) {
+  json out = class_json(map, belief);
+  out["properties"] = properties_json(map, belief, below);
   return out;
 }
 
@@ -220,6 +236,21 @@ std::string property_text(const json& belief) {
   return out.str();
 }
 
+void warn_of_misspelt_priors(const PropertyTable& properties, const ClassTable& classes, const std::string& where) {
+  const auto same = [](const std::string& a, const std::string& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                      [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+  };
+  for (const Property& property : properties.properties())
+    for (const auto& [name, prior] : property.priors) {
+      if (classes.slot_of_name(name)) continue;
+      for (int c = 0; c < classes.size(); ++c)
+        if (same(name, classes.at_slot(c).name))
+          spdlog::warn("{}: prior of {} for '{}': not used, as the class is called '{}'", where, property.name, name,
+                       classes.at_slot(c).name);
+    }
+}
+
 void use_properties(Map& map, const std::string& file) {
   if (file.empty()) return;
   const PropertyTable table = read_properties(file);
@@ -228,6 +259,7 @@ void use_properties(Map& map, const std::string& file) {
     if (!map.touches.touches.empty() && table.index_of(map.properties[p].name) != p)
       throw ConfigError(describe_mismatch(file, "properties", "those of the map, in their order, before new ones",
                                           "'" + map.properties[p].name + "' elsewhere or not at all"));
+  warn_of_misspelt_priors(table, map.classes, file);
   map.properties = table;
 }
 

@@ -33,6 +33,11 @@ struct RegionOptions {
   std::optional<ViewMask> view() const;
 };
 
+/// The strongest class, the class posterior and its entropy; empty in a map without classes.
+nlohmann::ordered_json class_json(const Map& map, const Belief& belief);
+/// `properties` of `belief_json`.
+nlohmann::ordered_json properties_json(const Map& map, const Belief& belief, std::optional<double> below);
+
 /// Class posterior and, per property, mean, sd, quantiles, CVaR, and with `below` P(psi <= below). What does not exist
 /// is null with its reason.
 nlohmann::ordered_json belief_json(const Map& map, const Belief& belief, std::optional<double> below);
@@ -44,6 +49,9 @@ std::string property_text(const nlohmann::ordered_json& belief);
 
 /// One line a person can read: "ice 0.97, friction 0.171 +- 0.043".
 std::string belief_text(const Map& map, const Belief& belief);
+
+/// Warns of priors for a class that the table lacks and that differs from one of its classes in capitals only.
+void warn_of_misspelt_priors(const PropertyTable& properties, const ClassTable& classes, const std::string& where);
 
 /// Tables of the command line replace those of the map: properties as far as no touch needs what they lack.
 void use_properties(Map& map, const std::string& file);

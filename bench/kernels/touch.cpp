@@ -127,6 +127,36 @@ void touch(benchmark::State& state, TouchModel model) {
 void query_and_material(benchmark::State& state) { touch(state, TouchModel::material); }
 void query_and_mixture(benchmark::State& state) { touch(state, TouchModel::mixture); }
 
+/// So many noisy touches of a floor, discs of 10 cm radius that overlap in all ways, each with its report.
+void batch_of_touches(benchmark::State& state) {
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 1);
+  size_t counted = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    Map map = floor_map(112, 8);
+    std::mt19937 rng(2);
+    std::uniform_real_distribution<double> place(0.2, 2.0), value(0.2, 0.5);
+    state.ResumeTiming();
+    TouchBatch batch(map);
+    for (int n = 0; n < state.range(0); ++n) {
+      TouchRequest request = reading(TouchModel::material);
+      request.stamp_s = n;
+      request.point_m = {place(rng), place(rng), 3.3 * 0.02};
+      request.value = value(rng);
+      request.sigma = 0.02;
+      request.region.rule = RegionRule::sphere;
+      request.region.radius_m = 0.1;
+      batch.apply(resolve_touch(map, request));
+    }
+    batch.finish();
+    counted = map.touches.touches.size();
+  }
+  if (counted != size_t(state.range(0))) state.SkipWithError("not every touch counts");
+  state.counters["ms/touch"] = benchmark::Counter(double(state.range(0)) * double(state.iterations()) * 1e-3,
+                                                  benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+BENCHMARK(batch_of_touches)->Arg(1)->Arg(10)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
+
 void sizes(benchmark::internal::Benchmark* b) {
   b->Args({112, 8})->Args({224, 8})->Args({448, 8})->Args({224, 40});
   b->Unit(benchmark::kMillisecond);

@@ -23,7 +23,8 @@ bool cold_scene(const std::vector<SampledFrame>& frames, const ClassTable& class
 
 }  // namespace
 
-std::optional<Finding> check_color_order(const std::vector<SampledFrame>& frames, const ClassTable& classes) {
+std::optional<Finding> check_color_order(const std::vector<SampledFrame>& frames, const ClassTable& classes,
+                                         bool exchanged) {
   double warm = 0, difference = 0, pixels = 0;
   for (const SampledFrame& frame : frames)
     for (int v = 0; v < frame.color.height(); v += 4)
@@ -44,14 +45,16 @@ std::optional<Finding> check_color_order(const std::vector<SampledFrame>& frames
   // Nearly grey pictures tell nothing.
   if (contrast < 3 || std::abs(balance) < 0.2 || (cold && balance < 0)) {
     finding.belief = cold ? "colour order cannot be told: snow, ice, sky or water may be in the pictures"
-                          : "colour order cannot be told from these colours; RGB is assumed";
+                          : std::string("colour order cannot be told from these colours; ") +
+                                (exchanged ? "it is read as BGR" : "RGB is assumed");
     return finding;
   }
   finding.faulty = balance < 0;
   // Of 12 recordings looked at, all with |balance| above 0.3 were told rightly.
   finding.confidence = std::min(0.98, 0.8 + 0.3 * (std::abs(balance) - 0.2));
-  finding.belief = finding.faulty ? "red and blue are exchanged (BGR)" : "colours are RGB";
-  if (finding.faulty) finding.remedy = "--bgr";
+  const bool bgr = finding.faulty != exchanged;
+  finding.belief = bgr ? "red and blue are exchanged (BGR)" : "colours are RGB";
+  if (finding.faulty) finding.remedy = bgr ? "--bgr" : "leave out --bgr";
   return finding;
 }
 

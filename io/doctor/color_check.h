@@ -12,6 +12,8 @@ namespace felt {
 /// mostly warm (wood, skin, walls in artificial light), so that the sum of R - B over pixels is positive: 0.3 to 0.9 of
 /// the sum of |R - B| in recordings looked at. Scenes of which a tenth is labelled snow, ice, water or
 /// sky are not judged, nor unlabelled ones whose class table names these. Nothing where there is no colour.
-std::optional<Finding> check_color_order(const std::vector<SampledFrame>& frames, const ClassTable& classes);
+/// `exchanged`: they are exchanged already as the sequence is read now.
+std::optional<Finding> check_color_order(const std::vector<SampledFrame>& frames, const ClassTable& classes,
+                                         bool exchanged);
 
 }  // namespace felt

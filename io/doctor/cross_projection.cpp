@@ -95,6 +95,17 @@ PairScore score_pair(const SampledFrame& a, const SampledFrame& b, const Eigen::
 
 }  // namespace
 
+Eigen::Isometry3d pose_under(const Reading& reading, Eigen::Isometry3d recorded,
+                             const Eigen::Isometry3d& T_body_camera) {
+  if (reading.w_first) {
+    // What was taken for x, y, z, w was w, x, y, z. Poses that were interpolated meanwhile are the same: the exchange
+    // turns the space of quaternions.
+    const Eigen::Quaterniond taken(recorded.linear());
+    recorded.linear() = Eigen::Quaterniond(taken.x(), taken.y(), taken.z(), taken.w()).toRotationMatrix();
+  }
+  return camera_pose(recorded, reading.convention, T_body_camera);
+}
+
 PinholeCamera camera_of(const PinholeCamera& camera, const Reading& reading) {
   PinholeCamera c = camera;
   if (reading.swapped_camera) {
@@ -112,7 +123,7 @@ std::vector<PairScore> cross_project(const std::vector<SampledFrame>& frames, co
   std::vector<std::optional<Eigen::Isometry3d>> poses(frames.size());
   for (size_t i = 0; i < frames.size(); ++i)
     if (const auto recorded = recorded_at(trajectory, frames[i], reading.pose_delay))
-      poses[i] = camera_pose(*recorded, reading.convention, trajectory.T_body_camera);
+      poses[i] = pose_under(reading, *recorded, trajectory.T_body_camera);
   std::vector<PairScore> scores(pairs.size());
   tbb::parallel_for(size_t(0), pairs.size(), [&](size_t i) {
     const auto [a, b] = pairs[i];

@@ -18,6 +18,7 @@ struct Reading {
   double focal_factor = 1;      ///< on fx and fy as read
   bool swapped_camera = false;  ///< fx, cx exchanged with fy, cy
   double pose_delay = 0;        ///< pose of a frame is the trajectory's at stamp + this: seconds, or frames
+  bool w_first = false;         ///< quaternions of the poses, read as x y z w, are written w x y z
   bool operator==(const Reading&) const = default;
 };
 
@@ -63,6 +64,10 @@ struct PairScore {
 std::vector<PairScore> cross_project(const std::vector<SampledFrame>& frames, const std::vector<Pair>& pairs,
                                      const RecordedTrajectory& trajectory, const PinholeCamera& camera,
                                      const Reading& reading, int every = 1);
+
+/// The camera's pose that a recorded one means under a reading.
+Eigen::Isometry3d pose_under(const Reading& reading, Eigen::Isometry3d recorded,
+                             const Eigen::Isometry3d& T_body_camera);
 
 /// The camera as a reading changes it.
 PinholeCamera camera_of(const PinholeCamera& camera, const Reading& reading);

@@ -68,9 +68,9 @@ Examination examine_sequence(const fs::path& path, const SequenceOptions& option
     examination.findings.push_back(
         check_trajectory(sample.geometry, best, *plain_reader(path, options, listing, Images::depth)));
   }
-  if (auto finding = check_color_order(sample.geometry.frames, listing.classes))
+  if (auto finding = check_color_order(sample.geometry.frames, listing.classes, options.bgr))
     examination.findings.push_back(std::move(*finding));
-  if (auto finding = check_labels(sample.geometry, best, listing.classes))
+  if (auto finding = check_labels(sample.geometry, best, listing.classes, options.label_offset))
     examination.findings.push_back(std::move(*finding));
   examination.proposal = propose(sample.geometry, best);
   return examination;
@@ -88,7 +88,7 @@ Examination examine_quickly(const fs::path& path, const SequenceOptions& options
   if (sample.geometry.frames.empty()) return examination;
   const Reading best = best_reading(sample.geometry, false);
   append(examination.findings, geometry_findings(sample.geometry, best, false));
-  if (auto finding = check_color_order(sample.geometry.frames, listing.classes))
+  if (auto finding = check_color_order(sample.geometry.frames, listing.classes, options.bgr))
     examination.findings.push_back(std::move(*finding));
   examination.proposal = propose(sample.geometry, best);
   return examination;

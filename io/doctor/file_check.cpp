@@ -121,10 +121,11 @@ Finding check_missing(const SequenceListing& listing) {
   if (partnerless && listing.stamped)
     finding.remedy =
         "--max-dt with a larger difference where colour lies farther from depth; --no-color where there is less of it";
-  else if (finding.faulty)
+  else if (many_poses_missing && frames.front().depth.codec == ImageSource::Codec::scan)
     finding.remedy =
-        "nothing needs to be done: these frames are skipped and counted; copy the recording again if they should be "
-        "there";
+        "add poses.txt with a line of 12 numbers for each scan (docs/datasets.md): scans without are skipped";
+  else if (finding.faulty)
+    finding.remedy = "copy the recording again if these frames should be there; else they are skipped and counted";
   return finding;
 }
 

@@ -26,19 +26,14 @@ public:
     const int changes = (r.convention.world_to_camera != now.convention.world_to_camera) +
                         (r.convention.opengl_axes != now.convention.opengl_axes) + (r.depth_factor != 1) +
                         (r.ray_length != now.ray_length) + (r.focal_factor != 1) + r.swapped_camera +
-                        (r.pose_delay != 0);
+                        (r.pose_delay != 0) + r.w_first;
     const std::vector<PairScore> scores =
         cross_project(sample_.frames, sample_.pairs, sample_.trajectory, sample_.camera, r, every);
     return mean_score(scores, sample_.median_depth_m * r.depth_factor) - kCostOfChange * changes -
-           4 * off_center(camera_of(sample_.camera, r));
+           off_center(camera_of(sample_.camera, r));
   }
 
 private:
-  /// How far the principal point lies from the image's centre: squared shares of width and height.
-  static double off_center(const PinholeCamera& c) {
-    const double x = (c.cx + 0.5) / c.width - 0.5, y = (c.cy + 0.5) / c.height - 0.5;
-    return x * x + y * y;
-  }
   const GeometrySample& sample_;
 };
 
@@ -124,6 +119,27 @@ double mean_score(const std::vector<PairScore>& scores, double median_depth_m) {
   return sum / double(std::max<size_t>(1, scores.size())) - 0.05 * off * off;
 }
 
+Agreement agreement_of(const std::vector<PairScore>& scores) {
+  std::vector<double> meets, residuals;
+  for (const PairScore& score : scores) {
+    if (score.in_view < 0.05) continue;
+    meets.push_back(score.meets);
+    if (score.meets > 0) residuals.push_back(score.residual);
+  }
+  const auto median = [](std::vector<double>& values) {
+    if (values.empty()) return 0.0;
+    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+    return values[values.size() / 2];
+  };
+  return {int(meets.size()), median(meets), median(residuals)};
+}
+
+double off_center(const PinholeCamera& c) {
+  // Squared shares of width and height: 0.17 for the camera of an upright image of 4:3 in one that lies.
+  const double x = (c.cx + 0.5) / c.width - 0.5, y = (c.cy + 0.5) / c.height - 0.5;
+  return 4 * (x * x + y * y);
+}
+
 Comparison compare(const std::vector<PairScore>& base, const std::vector<PairScore>& other) {
   Comparison comparison;
   for (size_t i = 0; i < base.size(); ++i) {
@@ -142,13 +158,18 @@ bool convincing(const Comparison& comparison, double least_gain) {
 
 namespace {
 
-Reading search_best(const GeometrySample& sample, bool thorough, bool any_scale) {
+Reading search_best(const GeometrySample& sample, bool thorough, bool any_scale, bool w_first) {
   const Search search(sample);
   std::vector<double> factors = {1};
   for (const double scale : kDepthScales)
     if (any_scale && scale != sample.depth_scale) factors.push_back(sample.depth_scale / scale);
   const PinholeCamera& camera = sample.camera;
-  const bool may_be_swapped = std::abs(camera.cx - camera.cy) > 0.02 * camera.width || camera.fx != camera.fy;
+  // Exchanging back brings the principal point towards the image's middle. Where it takes it away from there, the
+  // exchange would only stand in for a focal length that is wrong.
+  const bool differs = std::abs(camera.cx - camera.cy) > 0.02 * camera.width || camera.fx != camera.fy;
+  Reading exchanged;
+  exchanged.swapped_camera = true;
+  const bool may_be_swapped = differs && off_center(camera_of(camera, exchanged)) < off_center(camera) + 0.02;
 
   std::vector<Candidate> candidates;
   for (const bool inverse : {false, true})
@@ -163,6 +184,7 @@ Reading search_best(const GeometrySample& sample, bool thorough, bool any_scale)
             reading.depth_factor = factor;
             reading.ray_length ^= ray;
             reading.swapped_camera = swapped;
+            reading.w_first = w_first;
             candidates.push_back({reading, search.value(reading)});
           }
   const auto better = [](const Candidate& a, const Candidate& b) { return a.value > b.value; };
@@ -193,8 +215,22 @@ bool shows_scale(const GeometrySample& sample, const Reading& reading) {
 }  // namespace
 
 Reading best_reading(const GeometrySample& sample, bool thorough) {
-  const Reading best = search_best(sample, thorough, true);
-  return best.depth_factor == 1 || shows_scale(sample, best) ? best : search_best(sample, thorough, false);
+  const auto search = [&](bool w_first) {
+    const Reading best = search_best(sample, thorough, true, w_first);
+    return best.depth_factor == 1 || shows_scale(sample, best) ? best : search_best(sample, thorough, false, w_first);
+  };
+  const auto scores = [&](const Reading& reading) {
+    return cross_project(sample.frames, sample.pairs, sample.trajectory, sample.camera, reading);
+  };
+  const Reading best = search(false);
+  const std::vector<PairScore> best_scores = scores(best);
+  // Few sequences store quaternions: none is asked about them that fits with its poses as they are.
+  constexpr double kFits = 0.5;
+  if (best.convention == sample.now.convention && agreement_of(best_scores).meets >= kFits) return best;
+  const Reading w_first = search(true);
+  const std::vector<PairScore> w_first_scores = scores(w_first);
+  return agreement_of(w_first_scores).meets >= kFits && convincing(compare(best_scores, w_first_scores)) ? w_first
+                                                                                                         : best;
 }
 
 }  // namespace felt

@@ -11,15 +11,28 @@ struct GeometrySample {
   std::vector<SampledFrame> frames;
   std::vector<Pair> pairs;
   RecordedTrajectory trajectory;
-  PinholeCamera camera;    ///< as read now
-  Reading now;             ///< how the sequence is read now
-  double depth_scale = 0;  ///< stored units per metre, as read now
-  bool stamped = false;    ///< stamps are seconds
+  PinholeCamera camera;     ///< as read now
+  Reading now;              ///< how the sequence is read now
+  double depth_scale = 0;   ///< stored units per metre, as read now
+  double stamp_offset = 0;  ///< added to the stamps of poses, as read now: seconds, or frame numbers
+  bool stamped = false;     ///< stamps are seconds
   double median_depth_m = 0;
 };
 
 /// Mean score of the pairs, with a weak preference for depths of an arm's length to a room's.
 double mean_score(const std::vector<PairScore>& scores, double median_depth_m);
+
+/// Medians over the pairs that see each other.
+struct Agreement {
+  int pairs = 0;        ///< that see each other
+  double meets = 0;     ///< share of points in view that meet the other surface
+  double residual = 0;  ///< of those
+};
+Agreement agreement_of(const std::vector<PairScore>& scores);
+
+/// Share of points in view that meet the other surface below which no reading is believed: in a room a quarter of them
+/// do by chance.
+inline constexpr double kLeastMeeting = 0.35;
 
 /// `other` against `base`, pair by pair.
 struct Comparison {
@@ -33,13 +46,18 @@ Comparison compare(const std::vector<PairScore>& base, const std::vector<PairSco
 
 /// True where the evidence is strong enough to accuse `base`: the mean gain is at least `least_gain`, and three
 /// quarters of the deciding pairs agree.
-bool convincing(const Comparison& comparison, double least_gain = 0.08);
+inline constexpr double kLeastGain = 0.08;
+bool convincing(const Comparison& comparison, double least_gain = kLeastGain);
+
+/// How far the principal point lies from the image's middle, as a score: a camera that a sequence states has it there.
+double off_center(const PinholeCamera& camera);
 
 /// Stored units per metre that recordings use.
 inline constexpr double kDepthScales[] = {1, 100, 256, 1000, 5000, 6553.5, 10000};
 
 /// The reading under which the sample fits together best, as few changes from `sample.now` as the evidence asks for.
-/// `thorough`: also any depth scale, focal length and delay; else conventions, known scales and ray length.
+/// `thorough`: also any depth scale, focal length and delay; else conventions, known scales and ray length. Quaternions
+/// written w x y z are thought of where no reading fits as it is, or one with other poses does.
 Reading best_reading(const GeometrySample& sample, bool thorough);
 
 }  // namespace felt

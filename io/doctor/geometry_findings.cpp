@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace felt {
 namespace {
@@ -10,26 +11,6 @@ namespace {
 constexpr size_t kFramesForDelay = 8;
 
 std::string percent(double share) { return number_text(100 * share, "%.2g") + " %"; }
-
-/// Mean over pairs that see each other.
-struct Summary {
-  double meets = 0, residual = 0;
-};
-
-Summary summary_of(const std::vector<PairScore>& scores) {
-  std::vector<double> meets, residuals;
-  for (const PairScore& score : scores) {
-    if (score.in_view < 0.05) continue;
-    meets.push_back(score.meets);
-    if (score.meets > 0) residuals.push_back(score.residual);
-  }
-  const auto median = [](std::vector<double>& values) {
-    if (values.empty()) return 0.0;
-    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-    return values[values.size() / 2];
-  };
-  return {median(meets), median(residuals)};
-}
 
 class Findings {
 public:
@@ -41,7 +22,7 @@ public:
   /// Adds a finding on one component: `other` is the best reading with that component as it is read now (where `best`
   /// differs in it) or as the likeliest alternative (where it does not).
   void add(const std::string& topic, bool differs, const std::string& belief, const std::string& remedy,
-           const std::vector<Reading>& others, double least_gain = 0.08) {
+           const std::vector<Reading>& others, double least_gain = kLeastGain) {
     Finding finding{topic, false, 0, belief, "", ""};
     Comparison least;
     std::vector<PairScore> rival;
@@ -54,7 +35,7 @@ public:
     }
     finding.confidence = std::clamp(least.confidence(), 0.5, 0.99);
     finding.faulty = differs && convincing(least, least_gain);
-    const Summary mine = summary_of(scores_), theirs = summary_of(rival);
+    const Agreement mine = agreement_of(scores_), theirs = agreement_of(rival);
     finding.evidence = std::to_string(least.won) + " of " + std::to_string(least.decided) +
                        " frame pairs that tell fit better: " + percent(mine.meets) +
                        " of points in view meet the other surface (" + percent(mine.residual) + " off), against " +
@@ -64,7 +45,6 @@ public:
     if (differs && !finding.faulty) finding.belief += " would fit a little better, not clearly";
     list.push_back(finding);
   }
-  const Reading& best() const { return best_; }
 
   std::vector<Finding> list;
 
@@ -73,6 +53,29 @@ private:
   Reading best_;
   std::vector<PairScore> scores_;
 };
+
+/// Where hardly any point meets the other surface under the best reading, the components say nothing.
+std::optional<Finding> nothing_fits(const std::vector<PairScore>& best, const std::vector<PairScore>& now,
+                                    bool thorough) {
+  const Agreement agreement = agreement_of(best);
+  if (agreement.meets >= kLeastMeeting) return std::nullopt;
+  Finding finding{"fit", true, std::clamp(1 - agreement.meets, 0.5, 0.97), "", "", ""};
+  finding.evidence = percent(agreement.meets) + " of points in view meet the other surface under the best, " +
+                     percent(agreement_of(now).meets) + " as read now";
+  // Views that do not overlap meet nowhere, however sound.
+  if (agreement.pairs < 3 || 2 * size_t(agreement.pairs) < best.size()) {
+    finding.faulty = false;
+    finding.confidence = 0.5;
+    finding.belief = "it cannot be told whether poses, depth and camera fit: too few views overlap";
+    return finding;
+  }
+  finding.belief = "no reading of poses, depth and camera that was tried fits";
+  finding.remedy = thorough
+                       ? "no option mends it: look whether poses and images are of the same recording, and whether "
+                         "depth kept its 16 bits"
+                       : "see whether --intrinsics, --stamp-offset or poses of another recording are at fault";
+  return finding;
+}
 
 Reading with_delay(Reading reading, double delay) {
   reading.pose_delay = delay;
@@ -88,8 +91,15 @@ Reading with_focal(Reading reading, double factor) {
 std::vector<Finding> geometry_findings(const GeometrySample& sample, const Reading& best, bool thorough) {
   Findings findings(sample, best);
   const Reading& now = sample.now;
+  if (auto finding = nothing_fits(findings.scores(best), findings.scores(now), thorough)) return {*finding};
 
   Reading other = best;
+  if (best.w_first) {
+    other = now;
+    findings.add("quaternions", true, "quaternions of the poses are written w x y z",
+                 "no option mends it: write them x y z w, the real part last", {other});
+    other = best;
+  }
   other.convention.world_to_camera ^= true;
   findings.add("pose-convention", best.convention.world_to_camera != now.convention.world_to_camera,
                best.convention.world_to_camera ? "poses are world-to-camera" : "poses are camera-to-world",
@@ -121,7 +131,7 @@ std::vector<Finding> geometry_findings(const GeometrySample& sample, const Readi
   other.ray_length ^= true;
   findings.add("depth-along", best.ray_length != now.ray_length,
                best.ray_length ? "depth is the length of the ray" : "depth lies along the optical axis",
-               best.ray_length ? "--ray-length" : "--ray-length=false", {other});
+               best.ray_length ? "--ray-length" : "--no-ray-length", {other});
   if (!thorough && !best.swapped_camera) return findings.list;
 
   const PinholeCamera camera = camera_of(sample.camera, best);
@@ -132,9 +142,8 @@ std::vector<Finding> geometry_findings(const GeometrySample& sample, const Readi
     other = best;
     other.swapped_camera = false;
     findings.add("image-size", true, "the camera is that of an image with width and height exchanged", intrinsics,
-                 {other});
-    // The principal point, by now in the middle of the image, says so too.
-    if (Finding& size = findings.list.back(); !size.faulty) size.faulty = true, size.remedy = intrinsics;
+                 // The principal point, by now nearer to the middle of the image, speaks for it too.
+                 {other}, kLeastGain - (off_center(sample.camera) - off_center(camera)));
   }
   if (!thorough) return findings.list;
   const bool focal_differs = std::abs(std::log(best.focal_factor)) > 0.06;
@@ -145,17 +154,21 @@ std::vector<Finding> geometry_findings(const GeometrySample& sample, const Readi
                focal_differs ? std::vector<Reading>{with_focal(best, 1)}
                              : std::vector<Reading>{with_focal(best, best.focal_factor * 1.1),
                                                     with_focal(best, best.focal_factor / 1.1)});
-  if (sample.trajectory.spacing > 0) {
+  if (sample.trajectory.spacing > 0 && sample.frames.size() < kFramesForDelay) {
+    findings.list.push_back({"stamp-offset", false, 0.5,
+                             "it cannot be told from " + std::to_string(sample.frames.size()) +
+                                 " frames whether poses are those of the moments at which depth was taken",
+                             "", ""});
+  } else if (sample.trajectory.spacing > 0) {
     const double spacing = sample.trajectory.spacing, delay = best.pose_delay;
     // Real sensors are up to 25 ms apart; frames that only have numbers are taken for 30 a second.
-    const bool delay_differs = std::abs(delay) > (sample.stamped ? 0.025 : std::max(0.75, 0.15 * spacing)) &&
-                               sample.frames.size() >= kFramesForDelay;
+    const bool delay_differs = std::abs(delay) > (sample.stamped ? 0.025 : std::max(0.75, 0.15 * spacing));
     const std::string unit = sample.stamped ? " s" : " frame numbers";
     findings.add("stamp-offset", delay_differs,
                  std::abs(delay) > 0 ? "poses fit best when taken " + number_text(std::abs(delay)) + unit +
                                            (delay > 0 ? " later" : " earlier") + " than depth is stamped"
                                      : "poses are those of the moments at which depth was taken",
-                 "--stamp-offset " + number_text(-delay),
+                 "--stamp-offset " + number_text(sample.stamp_offset - delay, "%.4f"),
                  delay_differs
                      ? std::vector<Reading>{with_delay(best, 0)}
                      : std::vector<Reading>{with_delay(best, delay + spacing), with_delay(best, delay - spacing)},

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <map>
 
-#include "io/sequence/recorded_pose.h"
-
 namespace felt {
 namespace {
 
@@ -70,8 +68,8 @@ std::map<int, Counts> count_labels(const GeometrySample& sample, const Reading& 
     const auto& positions = sample.trajectory.position;
     const auto at = std::lower_bound(positions.begin(), positions.end(), frame.position);
     if (frame.labels.empty() || at == positions.end() || *at != frame.position) continue;
-    poses.push_back(camera_pose(sample.trajectory.recorded[size_t(at - positions.begin())], reading.convention,
-                                sample.trajectory.T_body_camera));
+    poses.push_back(pose_under(reading, sample.trajectory.recorded[size_t(at - positions.begin())],
+                               sample.trajectory.T_body_camera));
     frames.push_back(&frame);
   }
   const Eigen::Vector3d up = frames.empty() ? Eigen::Vector3d::UnitZ() : mean_up(poses);
@@ -121,7 +119,8 @@ Fit fit_of(const std::map<int, Counts>& counts, const ClassTable& classes, int o
 
 }  // namespace
 
-std::optional<Finding> check_labels(const GeometrySample& sample, const Reading& reading, const ClassTable& classes) {
+std::optional<Finding> check_labels(const GeometrySample& sample, const Reading& reading, const ClassTable& classes,
+                                    int label_offset) {
   const std::map<int, Counts> counts = count_labels(sample, reading);
   if (counts.empty()) return std::nullopt;
   Finding finding{"labels", false, 0.5, "", "", ""};
@@ -153,10 +152,11 @@ std::optional<Finding> check_labels(const GeometrySample& sample, const Reading&
   if (best != 0 && gain > 0.05 && tells) {
     finding.faulty = true;
     finding.confidence = std::min(0.99, 0.6 + gain);
-    finding.belief =
-        std::string("labels are one ") + (offsets[best] < 0 ? "above" : "below") + " the ids of the class table";
+    finding.belief = std::string("labels as read now are one ") + (offsets[best] < 0 ? "above" : "below") +
+                     " the ids of the class table";
     finding.evidence += "; moved by " + std::to_string(offsets[best]) + ": " + text(fits[best]);
-    finding.remedy = "--label-offset " + std::to_string(offsets[best]);
+    const int mended = label_offset + offsets[best];
+    finding.remedy = mended == 0 ? "leave out --label-offset" : "--label-offset " + std::to_string(mended);
   } else if (fits[0].unknown > 0.01) {
     std::string ids;
     for (const auto& [stored, c] : counts)

@@ -140,6 +140,7 @@ Sample take_sample(const std::filesystem::path& path, const SequenceOptions& opt
   geometry.now.convention = listing.pose_convention;
   geometry.now.ray_length = listing.depth_is_ray_length;
   geometry.depth_scale = listing.depth_scale;
+  geometry.stamp_offset = options.pose_stamp_offset;
   geometry.stamped = listing.stamped;
   std::vector<int64_t> posed = positions;
   if (plan.whole_trajectory) {

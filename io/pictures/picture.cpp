@@ -20,6 +20,11 @@ void write_encoded(const fs::path& path, const std::vector<uint8_t>& png) {
   file.commit();
 }
 
+/// 0 at `low` to 1 at `high`, cut at both; 0 where both are the same.
+double share_of(double value, double low, double high) {
+  return high > low ? std::clamp((value - low) / (high - low), 0.0, 1.0) : 0.0;
+}
+
 void paste(const ColorImage& panel, ColorImage& picture, int u0, int v0) {
   for (int v = 0; v < panel.height(); ++v) std::copy_n(panel.row(v), panel.width(), picture.row(v0 + v) + u0);
 }
@@ -28,9 +33,10 @@ void paste(const ColorImage& panel, ColorImage& picture, int u0, int v0) {
 
 void write_png(const fs::path& path, const ColorImage& image) { write_encoded(path, encode_png(image)); }
 
-void write_depth_png(const fs::path& path, const DepthImage& depth_m, double metres_per_step) {
+int64_t write_depth_png(const fs::path& path, const DepthImage& depth_m, double metres_per_step) {
   int64_t too_far = 0;
   write_encoded(path, encode_png(stored_depth(depth_m, 1 / metres_per_step, too_far)));
+  return too_far;
 }
 
 void write_label_png(const fs::path& path, const LabelImage& labels) { write_encoded(path, encode_png(labels)); }
@@ -38,8 +44,9 @@ void write_label_png(const fs::path& path, const LabelImage& labels) { write_enc
 void write_level_png(const fs::path& path, const Image<float>& values, double low, double high) {
   Image<uint16_t> levels(values.width(), values.height());
   for (size_t i = 0; i < levels.size(); ++i) {
-    const double value = double(values.data()[i]), share = std::clamp((value - low) / (high - low), 0.0, 1.0);
-    levels.data()[i] = std::isfinite(value) ? uint16_t(std::lround(1 + 65534 * share)) : uint16_t(0);
+    const double value = double(values.data()[i]);
+    levels.data()[i] =
+        std::isfinite(value) ? uint16_t(std::lround(1 + 65534 * share_of(value, low, high))) : uint16_t(0);
   }
   write_encoded(path, encode_png(levels));
 }
@@ -52,7 +59,7 @@ ColorImage colored(const Image<float>& values, double low, double high) {
   for (size_t i = 0; i < values.size(); ++i) {
     const double value = double(values.data()[i]);
     if (!std::isfinite(value)) continue;
-    const double at = std::clamp((value - low) / (high - low), 0.0, 1.0) * kLast;
+    const double at = share_of(value, low, high) * kLast;
     const int stop = std::min(int(at), kLast - 1);
     const auto channel = [&](int c) {
       return uint8_t(std::lround(kStops[stop][c] + (at - stop) * (kStops[stop + 1][c] - kStops[stop][c])));

@@ -10,10 +10,11 @@
 
 namespace felt {
 
-/// Writes an 8-bit RGB PNG, whole or not at all; throws IoError.
+/// Writes an 8-bit PNG, RGB or, where a pixel is transparent, RGBA, whole or not at all; throws IoError.
 void write_png(const std::filesystem::path& path, const ColorImage& image);
-/// Writes a 16-bit grey PNG: depth in steps of `metres_per_step`, 0 where there is none or it does not fit.
-void write_depth_png(const std::filesystem::path& path, const DepthImage& depth_m, double metres_per_step = 0.001);
+/// Writes a 16-bit grey PNG: depth in steps of `metres_per_step`, 0 where there is none or it does not fit. Returns the
+/// number of pixels that do not fit.
+int64_t write_depth_png(const std::filesystem::path& path, const DepthImage& depth_m, double metres_per_step = 0.001);
 
 /// Writes a 16-bit grey PNG of class ids.
 void write_label_png(const std::filesystem::path& path, const LabelImage& labels);

@@ -271,7 +271,7 @@ Slide slide_of(const FrictionReading& reading, size_t firm_begin, size_t firm_en
   double tangential = 0;
   for (size_t i = slide.begin; i < slide.end; ++i) tangential += reading.tangential_n[i];
   tangential /= double(slide.end - slide.begin);
-  if (tangential < 3 * wavers_n)
+  if (tangential < 2 * wavers_n)
     none("a tangential force of " + text(tangential) + " N where the sensor wavers by " + text(wavers_n) +
          " N without contact");
   return slide;

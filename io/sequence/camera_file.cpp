@@ -74,8 +74,16 @@ Intrinsics intrinsics_of_numbers(const std::vector<double>& n, const std::string
   if (!lower_left_is_zero || !finite || k.fx <= 0 || k.fy <= 0)
     throw FormatError(describe_mismatch(where, "camera matrix", "[fx 0 cx; 0 fy cy; 0 0 1] with fx, fy > 0",
                                         "fx " + std::to_string(k.fx) + ", fy " + std::to_string(k.fy) + ", cx " +
-                                            std::to_string(k.cx) + ", cy " + std::to_string(k.cy)));
+                                            std::to_string(k.cx) + ", cy " + std::to_string(k.cy) +
+                                            negative_focal_hint(k.fy)));
   return k;
+}
+
+std::string negative_focal_hint(double fy) {
+  if (!(fy < 0)) return {};
+  // K diag(1, -1, 1) has the positive fy; poses T become M T M, which stay rotations, and the world is mirrored.
+  return " (a negative fy is a camera whose y axis points up, as ICL-NUIM's: give it without the sign, as by "
+         "--intrinsics, and poses mirrored alike, M T M with M = diag(1, -1, 1, 1), that is tx -ty tz -qx qy -qz qw)";
 }
 
 CameraFile read_camera_file(const fs::path& path) {

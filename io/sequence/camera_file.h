@@ -23,6 +23,9 @@ CameraFile read_camera_file(const std::filesystem::path& path);
 /// Nine (3x3), sixteen (4x4) or four numbers, row-major, as intrinsics. Throws FormatError naming `where`.
 Intrinsics intrinsics_of_numbers(const std::vector<double>& numbers, const std::string& where);
 
+/// What to do about a negative fy, as the original ICL-NUIM has it, in brackets with a space before; empty for others.
+std::string negative_focal_hint(double fy);
+
 /// Throws FormatError where no lens of an RGB-D sensor gives such a camera: a principal point outside the image, or an
 /// angle of view across the image below 5 or above 170 degrees. Catches calibrations of another camera or image size.
 void check_camera_fits_image(const PinholeCamera& camera, const std::string& where);

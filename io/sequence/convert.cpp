@@ -20,21 +20,22 @@ namespace {
 /// Where a layout keeps each kind of file, as printf patterns of the frame number; empty: it has no place for it.
 struct FileNames {
   const char* layout;
-  double depth_scale;  ///< 0: the sequence's own
+  double depth_scale;       ///< 0: the sequence's own
+  bool states_depth_scale;  ///< its files can say another one
   bool counts_from_zero;
   const char *depth, *color, *labels, *probabilities, *instances, *pose;
 };
 
 constexpr FileNames kLayouts[] = {
-    {"generic", 0, false, "depth/%06lld.png", "color/%06lld", "labels/%06lld.png", "probs/%06lld.png",
+    {"generic", 0, true, false, "depth/%06lld.png", "color/%06lld", "labels/%06lld.png", "probs/%06lld.png",
      "instances/%06lld.png", ""},
-    {"7scenes", 1000, false, "seq-01/frame-%06lld.depth.png", "seq-01/frame-%06lld.color",
+    {"7scenes", 1000, false, false, "seq-01/frame-%06lld.depth.png", "seq-01/frame-%06lld.color",
      "seq-01/frame-%06lld.label.png", "", "", "seq-01/frame-%06lld.pose.txt"},
-    {"tum", 5000, false, "depth/%06lld.png", "rgb/%06lld", "", "", "", ""},
-    {"replica", 6553.5, true, "results/depth%06lld.png", "results/frame%06lld", "semantic/semantic%06lld.png", "",
+    {"tum", 5000, true, false, "depth/%06lld.png", "rgb/%06lld", "", "", "", ""},
+    {"replica", 6553.5, true, true, "results/depth%06lld.png", "results/frame%06lld", "semantic/semantic%06lld.png", "",
      "instance/instance%06lld.png", ""},
-    {"redwood", 1000, true, "depth/%05lld.png", "color/%05lld", "", "", "", ""},
-    {"icl", 1000, false, "depth/%05lld.png", "color/%05lld", "labels/%05lld.png", "", "", "pose/%05lld.txt"},
+    {"redwood", 1000, true, true, "depth/%05lld.png", "color/%05lld", "", "", "", ""},
+    {"icl", 1000, false, false, "depth/%05lld.png", "color/%05lld", "labels/%05lld.png", "", "", "pose/%05lld.txt"},
 };
 
 std::string named(const char* pattern, int64_t number) {
@@ -46,6 +47,13 @@ std::string named(const char* pattern, int64_t number) {
 std::string number(double value) {
   char text[40];
   std::snprintf(text, sizeof text, "%.17g", value);
+  return text;
+}
+
+/// For people: three digits.
+std::string short_number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.3g", value);
   return text;
 }
 
@@ -89,6 +97,16 @@ public:
                                            : own_scale(info);
   }
 
+  /// What the layout cannot say about the depth of any frame.
+  void add_depth_losses(const ConvertOptions& options, ConvertResult& result) const {
+    const bool generic = names_.layout == std::string("generic");
+    if (info_.voxel_size_m > 0 && !generic) result.left_out.emplace_back("the voxel size that suits the sensor");
+    if (info_.max_depth_m > 0 && !generic) result.left_out.emplace_back("the depth that the sensor reaches to");
+    // A scale that was asked for is no surprise.
+    if (options.depth_scale == 0 && info_.depth_scale > depth_scale_)
+      result.left_out.push_back("depth steps finer than " + short_number(1000 / depth_scale_) + " mm");
+  }
+
   void add(const Frame& frame, ConvertResult& result) {
     const auto lost = [&](bool there, const char* pattern, const char* what) {
       if (there && *pattern == 0 &&
@@ -102,6 +120,8 @@ public:
          "which pixels have no colour");
     lost(frame.stamp_s != double(frame.index), keeps_stamps() ? "stamps" : "", "stamps");
     const int64_t i = from_zero_ ? result.written : frame.index;
+    result.depth_measured +=
+        std::count_if(frame.depth_m.begin(), frame.depth_m.end(), [](float depth_m) { return depth_m > 0; });
     put(named(names_.depth, i), encode_png(stored_depth(frame.depth_m, depth_scale_, result.depth_out_of_range)));
     const std::string color = named(names_.color, i) + (jpeg_ ? ".jpg" : ".png");
     if (!frame.color.empty()) put(color, jpeg_ ? encode_jpeg(frame.color) : encode_png(frame.color));
@@ -132,17 +152,23 @@ public:
     const std::string fx = number(c.fx), fy = number(c.fy), cx = number(c.cx), cy = number(c.cy),
                       width = std::to_string(c.width), height = std::to_string(c.height), scale = number(depth_scale_);
     const std::string rows = fx + " 0 " + cx + "\n0 " + fy + " " + cy + "\n0 0 1\n";
+    const std::string camera =
+        "fx: " + fx + ", fy: " + fy + ", cx: " + cx + ", cy: " + cy + ", width: " + width + ", height: " + height;
     const std::string layout = names_.layout;
+    const bool other_scale = depth_scale_ != names_.depth_scale;
     if (layout == "generic") {
-      put("sequence.yaml", "camera: {fx: " + fx + ", fy: " + fy + ", cx: " + cx + ", cy: " + cy + ", width: " + width +
-                               ", height: " + height + "}\ndepth_scale: " + scale +
-                               "\npose_convention: camera-to-world\n");
+      put("sequence.yaml", "camera: {" + camera + "}\ndepth_scale: " + scale + "\npose_convention: camera-to-world\n" +
+                               (info_.voxel_size_m > 0 ? "voxel_size: " + number(info_.voxel_size_m) + "\n" : "") +
+                               (info_.max_depth_m > 0 ? "max_depth: " + number(info_.max_depth_m) + "\n" : ""));
       put("poses.txt", numbered_text());
     } else if (layout == "tum") {
       put("depth.txt", "# timestamp filename\n" + depth_list_);
       put("rgb.txt", "# timestamp filename\n" + color_list_);
       put("groundtruth.txt", "# timestamp tx ty tz qx qy qz qw\n" + poses_);
-      put("camera-intrinsics.txt", rows);
+      if (other_scale)
+        put("camera.yaml", "{" + camera + ", depth_scale: " + scale + "}\n");
+      else
+        put("camera-intrinsics.txt", rows);
     } else if (layout == "replica") {
       put("traj.txt", poses_);
       put("cam_params.json", "{\"camera\": {\"w\": " + width + ", \"h\": " + height + ", \"fx\": " + fx + ", \"fy\": " +
@@ -150,7 +176,8 @@ public:
     } else if (layout == "redwood") {
       put("trajectory.log", poses_);
       put("intrinsic.json", "{\"width\": " + width + ", \"height\": " + height + ", \"intrinsic_matrix\": [" + fx +
-                                ", 0, 0, 0, " + fy + ", 0, " + cx + ", " + cy + ", 1]}\n");
+                                ", 0, 0, 0, " + fy + ", 0, " + cx + ", " + cy + ", 1]" +
+                                (other_scale ? ", \"depth_scale\": " + scale : "") + "}\n");
     } else {
       put(layout == "7scenes" ? "camera-intrinsics.txt" : "intrinsics.txt", rows);
     }
@@ -171,6 +198,9 @@ public:
     copy(info_.properties_file, "properties.yaml", generic);
     copy(info_.touches_file, "touches.csv", generic && !from_zero_);
   }
+
+  /// Stored units per metre.
+  double depth_scale() const { return depth_scale_; }
 
 private:
   bool keeps_stamps() const { return names_.layout == std::string("generic") || names_.layout == std::string("tum"); }
@@ -237,6 +267,11 @@ ConvertResult convert_sequence(const SequenceReader& reader, const fs::path& out
   if (!(options.depth_scale >= 0 && options.depth_scale <= kMostDepthScale))
     throw ConfigError(describe_mismatch("--written-depth-scale", "units per metre", "at most 1000000, or 0",
                                         std::to_string(options.depth_scale)));
+  if (options.depth_scale > 0 && options.depth_scale != names.depth_scale && !names.states_depth_scale)
+    throw ConfigError(
+        describe_mismatch("--written-depth-scale", "units per metre",
+                          number(names.depth_scale) + ", as no file of " + options.layout + " can state another",
+                          number(options.depth_scale)));
   std::error_code fault;
   if (fs::exists(out, fault) && !(fs::is_directory(out) && fs::is_empty(out)))
     throw IoError(describe_mismatch(out.string(), "output", "a folder that does not exist yet", "something there"));
@@ -247,6 +282,7 @@ ConvertResult convert_sequence(const SequenceReader& reader, const fs::path& out
   FolderInProgress folder(out);
   ConvertResult result;
   Writer writer(names, folder.path(), reader.info(), options);
+  writer.add_depth_losses(options, result);
   for (int64_t i = 0; i < reader.size(); ++i) {
     const ReadResult read = reader.read(i);
     if (const auto* skipped = std::get_if<SkippedFrame>(&read))
@@ -255,9 +291,19 @@ ConvertResult convert_sequence(const SequenceReader& reader, const fs::path& out
       writer.add(std::get<Frame>(read), result);
     if (progress && !progress(i + 1)) return {};
   }
-  if (result.written == 0)
+  if (result.written == 0) {
+    std::string reasons;
+    for (const auto& [reason, count] : result.skipped)
+      reasons += (reasons.empty() ? ": " : ", ") + std::to_string(count) + " " + reason;
     throw FormatError(
-        describe_mismatch(reader.info().path.string(), "frames", "at least one that can be read", "none"));
+        describe_mismatch(reader.info().path.string(), "frames", "at least one that can be read", "none" + reasons));
+  }
+  if (2 * result.depth_out_of_range > result.depth_measured)
+    throw FormatError(describe_mismatch(
+        reader.info().path.string(), "depth written at " + number(writer.depth_scale()) + " units per metre",
+        "most of it from 1 to 65534 units, up to " + short_number(65534 / writer.depth_scale()) + " m",
+        std::to_string(result.depth_out_of_range) + " of " + std::to_string(result.depth_measured) +
+            " measured pixels outside; --written-depth-scale says another scale, in a layout that can state it"));
   writer.finish();
   writer.add_tables(result);
   folder.commit();

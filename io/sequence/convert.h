@@ -14,7 +14,8 @@ namespace felt {
 struct ConvertOptions {
   std::string layout = "generic";  ///< one of `writable_layouts()`
   double depth_scale = 0;  ///< stored units per metre; 0: the layout's own, for generic the sequence's or, where it has
-                           ///< less than 100 (floating-point depth, scans), millimetres or what reaches as far
+                           ///< less than 100 (floating-point depth, scans), millimetres or what reaches as far. Files
+                           ///< of 7scenes and icl state none: only their own there.
   bool renumber = false;   ///< number frames from 0 in every layout
   bool jpeg_color = false;  ///< instead of PNG, which keeps every value
 };
@@ -25,7 +26,8 @@ constexpr double kMostDepthScale = 1e6;
 struct ConvertResult {
   int64_t written = 0;
   std::map<std::string, int64_t> skipped;  ///< frames that could not be read, by reason
-  int64_t depth_out_of_range = 0;          ///< measured pixels too far for 16 bits at the scale: stored as 0
+  int64_t depth_measured = 0;              ///< pixels that have depth
+  int64_t depth_out_of_range = 0;          ///< of those: too far for 16 bits or too near at the scale, stored as 0
   std::vector<std::string> left_out;       ///< what the sequence carries and the layout has no place for
 };
 
@@ -36,7 +38,8 @@ std::vector<std::string> writable_layouts();
 /// for is left out (docs/datasets.md). Frame numbers are kept, except in `replica` and `redwood`, which count from 0,
 /// and stamps in `generic` and `tum`. The folder appears whole or not at all: `out` must not exist, or be an empty
 /// folder. `progress` gets the number of frames read; false stops, and nothing is left. Throws ConfigError for an
-/// unknown layout, IoError.
+/// unknown layout and a depth scale that its files cannot state, IoError, and FormatError where no frame can be read or
+/// most of the measured depth does not fit at the scale.
 ConvertResult convert_sequence(const SequenceReader& reader, const std::filesystem::path& out,
                                const ConvertOptions& options, const std::function<bool(int64_t)>& progress = {});
 

@@ -163,7 +163,10 @@ void ListedSequence::find_camera(const fs::path& path) {
   int width = 0, height = 0;
   for (const FrameRecord& frame : listing_.frames) {
     if (width > 0) break;
-    if (frame.depth.empty()) continue;
+    if (frame.depth.empty()) {
+      if (!frame.fault_detail.empty()) last_fault = frame.fault_detail;
+      continue;
+    }
     if (frame.depth.codec != ImageSource::Codec::image_file) {
       width = listing_.width, height = listing_.height;
       break;

@@ -184,8 +184,14 @@ std::map<std::string, ReadValue> readers_of(ReconstructConfig& c, const fs::path
                               const std::string& where) { read_names(c.label_settings.ignore_classes, value, where); }},
       {"instances", flag_into(c.label_settings.instances)},
       {"spread_rest", flag_into(c.label_settings.spread_rest)},
-      {"threads", whole_into(c.threads, 1, 1024)},
+      {"threads", whole_into(c.threads, 0, 1024)},
   };
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text.append(text.empty() ? "" : ", ").append(word);
+  return text;
 }
 
 }  // namespace
@@ -238,7 +244,7 @@ ReconstructConfig read_reconstruct_config(const fs::path& path) {
       const auto reader = readers.find(key);
       if (reader == readers.end()) {
         const std::string near = nearest_word(key, known);
-        found.problem(entry.first, "key", near.empty() ? "a known key" : "'" + near + "'", "'" + key + "'");
+        found.problem(entry.first, "key", near.empty() ? "one of " + joined(known) : "'" + near + "'", "'" + key + "'");
         continue;
       }
       if (!seen.insert(key).second) {

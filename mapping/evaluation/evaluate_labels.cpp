@@ -110,13 +110,13 @@ LabelPrediction predict_labels(const RayCaster& caster, const VoxelBeliefs& beli
 
 LabelledMesh::LabelledMesh(TriangleMesh mesh, const std::string& label_name, const std::string& where)
     : mesh_(std::move(mesh)), tree_(mesh_) {
-  if (!mesh_.labels.empty()) return;
   triangle_label_ = TriangleMesh::find(mesh_.triangle_scalars, label_name);
-  if (triangle_label_ != nullptr) return;
-  std::string found = "none";
+  if (triangle_label_ != nullptr || (!mesh_.labels.empty() && label_name == kVertexLabels)) return;
+  std::string found =
+      mesh_.labels.empty() ? "none" : std::string("vertex labels, which are called '") + kVertexLabels + "'";
   for (const MeshScalars& s : mesh_.triangle_scalars)
     found += (&s == &mesh_.triangle_scalars[0] ? ", but: " : " ") + s.name;
-  throw Error(describe_mismatch(where, "labels", "vertex labels or '" + label_name + "' of triangles", found));
+  throw Error(describe_mismatch(where, "labels", "'" + label_name + "' of triangles or vertices", found));
 }
 
 uint16_t LabelledMesh::label(uint32_t triangle, const Vector3d& point) const {

@@ -42,11 +42,14 @@ struct LabelPrediction {
 LabelPrediction predict_labels(const RayCaster& caster, const VoxelBeliefs& beliefs, const PinholeCamera& camera,
                                const Eigen::Isometry3d& T_world_camera, double max_depth_m);
 
-/// A mesh whose labels are looked up: those of vertices (a triangle's point takes its nearest corner's) or, failing
-/// that, the triangle scalar `label_name`.
+/// What labels of vertices are called.
+constexpr const char* kVertexLabels = "label";
+
+/// A mesh whose labels are looked up: the triangle scalar `label_name` or, failing that and where that is their name,
+/// the labels of vertices (a triangle's point takes its nearest corner's).
 class LabelledMesh {
 public:
-  /// Throws Error where the mesh carries no labels.
+  /// Throws Error where the mesh carries no labels of that name.
   LabelledMesh(TriangleMesh mesh, const std::string& label_name, const std::string& where);
 
   /// Label id at a point of a triangle.

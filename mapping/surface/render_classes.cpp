@@ -33,7 +33,7 @@ LabelImage class_image(const Map& map, const VoxelBeliefs& beliefs, const Image<
 }
 
 Image<float> entropy_image(const VoxelBeliefs& beliefs, const Image<VoxelRef>& voxels) {
-  Image<float> image(voxels.width(), voxels.height(), 0);
+  Image<float> image(voxels.width(), voxels.height(), std::numeric_limits<float>::quiet_NaN());
   for_each_surface_pixel(beliefs, voxels, [&](int u, int v, const VoxelRef& voxel, auto& p) {
     beliefs.class_probability(voxel, p);
     image(u, v) = float(class_entropy(p));

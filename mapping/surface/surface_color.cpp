@@ -68,7 +68,7 @@ SurfaceColor parse_surface_color(const std::string& text, const Map& map) {
 void attach_beliefs(const Map& map, const std::vector<VertexEdge>& edges, TriangleMesh& mesh) {
   if (map.classes.empty()) return;
   const auto touched = std::make_shared<const std::vector<TouchView>>(touch_views(map));
-  mesh.labels.assign(edges.size(), 0);
+  mesh.labels.assign(edges.size(), kNoLabel);
   MeshScalars probability{"label_prob", std::vector<float>(edges.size(), kNan)};
   MeshScalars entropy{"entropy", std::vector<float>(edges.size(), kNan)};
   at_vertices(edges, [&](size_t i, const Index3& voxel) {

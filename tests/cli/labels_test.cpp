@@ -230,4 +230,13 @@ TEST_CASE("a class table that cannot be used ends with every fault and exit code
   CHECK_THAT(color.err, Contains("t.csv:3: color: expected r, g, b from 0 to 255, found '0, 256, 0'"));
 }
 
+TEST_CASE("labels that no table knows, and instances that no frame has, are said to be lost, also quietly") {
+  const Recording recording;
+  std::ofstream(recording.folder.path() / "other.yaml") << "classes: [{id: 40, name: lamp}, {id: 41, name: door}]\n";
+  const CommandResult result =
+      recording.reconstruct("--quiet --classes " + quoted(recording.folder.path() / "other.yaml"));
+  REQUIRE(result.exit_code == 0);
+  CHECK_THAT(result.err, Contains("labels that the class table does not know") && Contains("no voxel has a label"));
+}
+
 }  // namespace felt::test

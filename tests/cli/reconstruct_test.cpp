@@ -352,4 +352,28 @@ TEST_CASE("settings of labels that floats or the cap cannot hold are refused") {
   }
 }
 
+TEST_CASE("flags of the command line overrule a configuration, also to say no") {
+  const TemporaryDirectory folder;
+  std::ofstream(folder.path() / "c.yaml") << "bgr: true\ncarve: true\ncolor: false\nthreads: 0\n";
+  const std::string config = "--config " + quoted(folder.path() / "c.yaml");
+  const auto settings = [&](const std::string& name, const std::string& options) {
+    const CommandResult result = reconstruct(boxes(), folder.path() / name, "--json --frames 0:2 " + options);
+    INFO(result.err);
+    REQUIRE(result.exit_code == 0);
+    return json::parse(result.out).at("config");
+  };
+  const json as_configured = settings("a", config);
+  CHECK(as_configured.at("bgr") == true);
+  CHECK(as_configured.at("carve") == true);
+  CHECK(as_configured.at("color") == false);
+  const json overruled = settings("b", config + " --bgr=false --carve=false --no-color=false");
+  CHECK_FALSE(overruled.contains("bgr"));
+  CHECK(overruled.at("carve") == false);
+  CHECK(overruled.at("color") == true);
+  std::ofstream(folder.path() / "c.yaml") << "colour_of_walls: 3\n";
+  const CommandResult unknown = reconstruct(boxes(), folder.path() / "c", config);
+  CHECK(unknown.exit_code == 3);
+  CHECK_THAT(unknown.err, Catch::Contains("voxel_size"));
+}
+
 }  // namespace felt::test

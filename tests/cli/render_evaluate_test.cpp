@@ -10,6 +10,7 @@
 #include "tests/cli/command.h"
 #include "tests/support/analytic_map.h"
 #include "tests/support/data.h"
+#include "tests/support/labelled_map.h"
 
 namespace felt::test {
 namespace {
@@ -201,6 +202,75 @@ TEST_CASE("evaluate without a reference, and with one that is no mesh, says so")
       run_feltmap("evaluate " + map + " --reference-mesh " + (folder.path() / "bad.ply").string());
   CHECK(bad.exit_code == 4);
   CHECK_THAT(bad.err, Contains("bad.ply") && Contains("expected ply"));
+}
+
+TEST_CASE("pictures of a map with one class are of one colour, and pixels without surface are white") {
+  const TemporaryDirectory folder;
+  Map map = labelled_map(
+      0.02, {-0.4, -0.4, 0.9}, {0.4, 0.4, 1.1}, [](const Eigen::Vector3d& p) { return 1.0 - p.z(); },
+      class_table({"wall"}), [](const Eigen::Vector3d&) { return 0; });
+  const std::string path = (folder.path() / "map.vdb").string(), out = (folder.path() / "views").string();
+  save_map(map, path);
+  const CommandResult result = run_feltmap("render " + path + " --pose 0,0,0,0,0,0,1 --intrinsics 20,20,15.5,11.5 " +
+                                           "--size 32x24 --images entropy,class --colored --out " + out);
+  INFO(result.err);
+  REQUIRE(result.exit_code == 0);
+  const cv::Mat picture = cv::imread(out + "/000000.entropy.color.png");
+  CHECK(picture.at<cv::Vec3b>(12, 16) == cv::Vec3b(84, 1, 68));
+  CHECK(picture.at<cv::Vec3b>(0, 0) == cv::Vec3b(255, 255, 255));
+}
+
+TEST_CASE("depth beyond what 16 bits of millimetres hold is counted") {
+  const TemporaryDirectory folder;
+  const std::string map = wall_map(folder).string(), out = (folder.path() / "views").string();
+  const CommandResult result =
+      run_feltmap("render " + map + " --pose 0,0,-70,0,0,0,1 --intrinsics 2000,2000,15.5,11.5 " +
+                  "--size 32x24 --images depth --max-depth 100 --json --out " + out);
+  INFO(result.err);
+  REQUIRE(result.exit_code == 0);
+  CHECK(nlohmann::json::parse(result.out)["depth_pixels_too_far"] > 100);
+  CHECK_THAT(result.err, Contains("beyond 65.535 m"));
+}
+
+TEST_CASE("what a picture would replace must be a picture, and exports keep apart") {
+  const TemporaryDirectory folder;
+  const std::string map = wall_map(folder).string(), before = file_text(map);
+  CHECK(run_feltmap("render " + map + " --overview " + map).exit_code == 3);
+  CHECK(run_feltmap("export " + map + " --vdb " + map + " --half --force").exit_code == 3);
+  const std::string mesh = (folder.path() / "a.ply").string(), same = (folder.path() / "." / "a.ply").string();
+  const CommandResult result = run_feltmap("export " + map + " --mesh " + mesh + " --points " + same);
+  CHECK(result.exit_code == 3);
+  CHECK_THAT(result.err, Contains("another one than --mesh"));
+  CHECK(file_text(map) == before);
+  CHECK_FALSE(std::filesystem::exists(mesh));
+}
+
+TEST_CASE("evaluate looks at the frames that were asked for and says which options have nothing to do") {
+  const TemporaryDirectory folder;
+  const std::string scene = (source_dir() / "data" / "scenes" / "table_wall").string(), map = wall_map(folder).string(),
+                    mesh = (folder.path() / "m.ply").string();
+  REQUIRE(run_feltmap("reconstruct " + scene + " --out " + (folder.path() / "r").string() + " --quiet").exit_code == 0);
+  const std::string result = (folder.path() / "r" / "map.vdb").string(),
+                    reference = (folder.path() / "r" / "mesh.ply").string();
+  const auto seen = [&](const std::string& frames) {
+    const CommandResult answer = run_feltmap("evaluate " + result + " --reference-mesh " + reference +
+                                             " --trajectory " + scene + " --samples 5000 --json " + frames);
+    INFO(answer.err);
+    REQUIRE(answer.exit_code == 0);
+    return nlohmann::json::parse(answer.out)["reference_seen"].get<double>();
+  };
+  const double all = seen("");
+  CHECK(all > 0.5);
+  CHECK(seen("--frames 0:1") < all);
+  const std::string poses = (folder.path() / "poses.txt").string();
+  std::ofstream(poses) << "0 0 0 0 0 0 1\n";
+  for (const std::string& idle : {std::string("--frames 0:1"), std::string("--format tum"),
+                                  std::string("--properties x.yaml"), "--trajectory " + poses}) {
+    INFO(idle);
+    const CommandResult refused = run_feltmap("evaluate " + map + " --reference-mesh " + reference + " " + idle);
+    CHECK(refused.exit_code == 3);
+    CHECK_THAT(refused.err, Contains(idle.substr(0, 6)));
+  }
 }
 
 }  // namespace felt::test

@@ -54,4 +54,10 @@ TEST_CASE("a seed below zero and depths in the wrong order are refused") {
   CHECK_THAT(result.err, Catch::Matchers::Contains("expected a number above --min-depth, 5.0, found 4.0"));
 }
 
+TEST_CASE("an option that a shell left without a value is named, and does not take the next word") {
+  const CommandResult result = run_feltmap("reconstruct x --out= --force");
+  CHECK(result.exit_code == 2);
+  CHECK_THAT(result.err, Catch::Matchers::Contains("'--out=': expected a value"));
+}
+
 }  // namespace felt::test

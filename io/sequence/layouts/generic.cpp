@@ -36,7 +36,7 @@ public:
     if (!node && otherwise) return *otherwise;
     const auto number = node && node.IsScalar() ? parse_number(node.Scalar()) : std::nullopt;
     if (number && std::isfinite(*number) && *number > 0) return *number;
-    problem(node, key, "a number above 0");
+    problem(node, key, "a number above 0" + (number && key == std::string("fy") ? negative_focal_hint(*number) : ""));
     return 1;
   }
   /// A list of one of these lengths; empty where the key is absent or wrong.
@@ -63,8 +63,9 @@ void read_settings(const fs::path& file, SequenceListing& listing, std::map<std:
   if (!root.IsMap())
     throw FormatError(describe_mismatch(file.string(), "content", "keys and values", "something else"));
   Settings settings(root, file);
-  settings.refuse_unknown(root, {"camera", "color_camera", "depth_scale", "depth_encoding", "depth_is_ray_length",
-                                 "pose_convention", "paths", "name", "comment", "T_body_camera", "T_color_depth"});
+  settings.refuse_unknown(
+      root, {"camera", "color_camera", "depth_scale", "depth_encoding", "depth_is_ray_length", "pose_convention",
+             "paths", "name", "comment", "T_body_camera", "T_color_depth", "voxel_size", "max_depth"});
   const auto distortion_of = [&](const YAML::Node& node) {
     const std::vector<double> numbers = settings.numbers(node, "distortion", {4, 5});
     if (numbers.empty()) return Distortion{};
@@ -98,6 +99,8 @@ void read_settings(const fs::path& file, SequenceListing& listing, std::map<std:
   listing.T_color_depth = rigid("T_color_depth").matrix();
   listing.depth_scale = settings.positive(root, "depth_scale", 1000);
   listing.depth_scale_stated = bool(root["depth_scale"]);
+  listing.voxel_size_m = settings.positive(root, "voxel_size", 0);
+  listing.max_depth_m = settings.positive(root, "max_depth", 0);
   if (const YAML::Node flag = root["depth_is_ray_length"];
       flag && !YAML::convert<bool>::decode(flag, listing.depth_is_ray_length))
     settings.problem(flag, "depth_is_ray_length", "true or false");

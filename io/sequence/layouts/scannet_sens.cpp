@@ -78,6 +78,28 @@ std::vector<fs::path> containers_at(const fs::path& path) {
 
 bool recognises(const fs::path& path) { return !containers_at(path).empty(); }
 
+/// Before the images of a frame: its pose, two stamps, two sizes.
+constexpr uint64_t kFrameHeaderBytes = 16 * sizeof(float) + 4 * sizeof(uint64_t);
+
+/// A container cut short keeps its `whole` first frames of `count`. The others are listed all the same, without images:
+/// so they are counted wherever frames are.
+void list_lost_frames(const fs::path& path, uint64_t whole, uint64_t count, SequenceListing& listing) {
+  constexpr uint64_t kMostLost = 10000;  // a wrong count must not make us list a million empty frames
+  listing.notes.push_back(describe_mismatch(
+      path.string(), "container", std::to_string(count) + " frames",
+      "the end after " + std::to_string(whole) + ": it was cut short when it was recorded or copied"));
+  std::vector<FrameRecord>& frames = listing.frames;
+  const double last_stamp_s = frames.empty() ? 0 : frames.back().stamp_s;
+  for (uint64_t i = frames.size(); i < count && i - whole < kMostLost; ++i) {
+    FrameRecord frame;
+    frame.index = int64_t(i);
+    frame.stamp_s = listing.stamped ? last_stamp_s : double(i);
+    frame.fault = "missing depth image";
+    frame.fault_detail = path.string() + ": ends before frame " + std::to_string(i);
+    frames.push_back(std::move(frame));
+  }
+}
+
 SequenceListing list(const fs::path& file_or_folder, const SequenceOptions& options) {
   const std::vector<fs::path> containers = containers_at(file_or_folder);
   if (containers.size() != 1)
@@ -113,12 +135,8 @@ SequenceListing list(const fs::path& file_or_folder, const SequenceOptions& opti
   if (color_pose != depth_pose) listing.T_color_depth = color_pose.inverse() * depth_pose;
 
   const auto codec = depth_codec == kDepthZlib ? ImageSource::Codec::zlib_u16 : ImageSource::Codec::raw_u16;
-  for (uint64_t i = 0; i < count; ++i) {
-    if (file.left() == 0) {
-      listing.notes.push_back("the container ends after " + std::to_string(i) + " of " + std::to_string(count) +
-                              " frames");
-      break;
-    }
+  uint64_t whole_frames = 0;
+  for (uint64_t i = 0; i < count && file.left() >= kFrameHeaderBytes; ++i) {
     FrameRecord frame;
     frame.index = int64_t(i);
     frame.pose = read_matrix(file, "pose");
@@ -126,17 +144,18 @@ SequenceListing list(const fs::path& file_or_folder, const SequenceOptions& opti
     frame.stamp_s = double(file.value<uint64_t>("depth stamp")) * 1e-6;
     const auto color_bytes = file.value<uint64_t>("colour size"), depth_bytes = file.value<uint64_t>("depth size");
     const uint64_t color_at = file.at();
-    if (color_bytes > 0) frame.color = {path, color_at, color_bytes, ImageSource::Codec::image_file};
-    if (depth_bytes > 0) frame.depth = {path, color_at + color_bytes, depth_bytes, codec};
-    // A container cut short keeps its whole frames; the cut one is skipped when read.
     const bool whole = color_bytes <= file.left() && depth_bytes <= file.left() - color_bytes;
-    listing.frames.push_back(std::move(frame));
     if (!whole) {
-      listing.frames.back().fault = "truncated depth image";
-      listing.frames.back().fault_detail = path.string() + ": ends within frame " + std::to_string(i);
+      frame.fault = "truncated depth image";
+      frame.fault_detail = path.string() + ": ends within frame " + std::to_string(i);
+      listing.frames.push_back(std::move(frame));
       break;
     }
+    if (color_bytes > 0) frame.color = {path, color_at, color_bytes, ImageSource::Codec::image_file};
+    if (depth_bytes > 0) frame.depth = {path, color_at + color_bytes, depth_bytes, codec};
+    listing.frames.push_back(std::move(frame));
     file.skip(color_bytes + depth_bytes, "images");
+    ++whole_frames;
   }
   // Many containers hold zeros or repeated moments: frame numbers then.
   std::vector<FrameRecord>& frames = listing.frames;
@@ -145,6 +164,7 @@ SequenceListing list(const fs::path& file_or_folder, const SequenceOptions& opti
                     }) == frames.end();
   if (!listing.stamped)
     for (FrameRecord& frame : frames) frame.stamp_s = double(frame.index);
+  if (whole_frames < count) list_lost_frames(path, whole_frames, count, listing);
   return listing;
 }
 

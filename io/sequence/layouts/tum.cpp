@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "core/error.h"
 #include "io/files/text_input.h"
@@ -12,6 +13,8 @@
 namespace felt {
 namespace fs = std::filesystem;
 namespace {
+
+constexpr const char* kMissingColor = "missing colour image";
 
 struct StampedFile {
   double stamp_s = 0;
@@ -48,6 +51,61 @@ std::vector<double> sort_by_stamp(std::vector<T>& items) {
   return stamps;
 }
 
+std::string number_text(double number, const char* format) {
+  char text[40];
+  std::snprintf(text, sizeof text, format, number);
+  return text;
+}
+
+/// "first to last" of ascending stamps, `offset` added.
+std::string range_text(const std::vector<double>& stamps, double offset = 0) {
+  return number_text(stamps.front() + offset, "%.16g") + " to " + number_text(stamps.back() + offset, "%.16g");
+}
+
+/// " (stamps of poses in nanoseconds?)" where the two ranges of ascending stamps lie such a factor from each other.
+std::string unit_question(const std::vector<double>& depth_stamps, const std::vector<double>& pose_stamps) {
+  const double ratio = (pose_stamps.front() + pose_stamps.back()) / (depth_stamps.front() + depth_stamps.back());
+  const std::pair<double, const char*> units[] = {{3, "milliseconds"}, {6, "microseconds"}, {9, "nanoseconds"}};
+  for (const auto& [digits, unit] : units) {
+    if (std::abs(std::log10(ratio) - digits) < 0.5) return std::string(" (stamps of poses in ") + unit + "?)";
+    if (std::abs(std::log10(ratio) + digits) < 0.5) return std::string(" (stamps of depth images in ") + unit + "?)";
+  }
+  return {};
+}
+
+/// Says how the stamps lie to each other where most depth images have no pose near enough. Ascending stamps.
+void note_stamps_without_pose(const fs::path& trajectory, const std::vector<double>& depth_stamps,
+                              const std::vector<double>& pose_stamps, const SequenceOptions& options,
+                              SequenceListing& listing) {
+  const auto without =
+      std::count_if(listing.frames.begin(), listing.frames.end(), [](const FrameRecord& f) { return !f.pose; });
+  if (2 * size_t(without) <= listing.frames.size() || depth_stamps.empty() || pose_stamps.empty()) return;
+  double least_dt_s = std::numeric_limits<double>::infinity();
+  for (const double stamp_s : depth_stamps) {
+    const double moment = stamp_s - options.pose_stamp_offset;
+    const int64_t nearest = nearest_stamp(pose_stamps, moment, std::numeric_limits<double>::infinity());
+    if (nearest >= 0) least_dt_s = std::min(least_dt_s, std::abs(pose_stamps[size_t(nearest)] - moment));
+  }
+  listing.notes.push_back(describe_mismatch(
+      trajectory.string(), "stamps",
+      "poses within " + number_text(options.max_dt_s, "%g") + " s of the depth images of " + range_text(depth_stamps),
+      range_text(pose_stamps, options.pose_stamp_offset) + ": no pose for " + std::to_string(without) + " of " +
+          std::to_string(listing.frames.size()) + " images, the smallest difference " +
+          number_text(least_dt_s, "%.3g") + " s" + unit_question(depth_stamps, pose_stamps) +
+          "; --stamp-offset is added to the stamps of poses, --max-dt allows another difference"));
+}
+
+/// Says so where more depth images lack a partner in colour than recording alone explains.
+void note_depth_without_color(const SequenceOptions& options, SequenceListing& listing) {
+  const auto without = std::count_if(listing.frames.begin(), listing.frames.end(),
+                                     [](const FrameRecord& f) { return f.fault == kMissingColor; });
+  if (double(without) <= 0.3 * double(listing.frames.size())) return;
+  listing.notes.push_back(std::to_string(without) + " of " + std::to_string(listing.frames.size()) +
+                          " depth images have no colour image of their own within " +
+                          number_text(options.max_dt_s, "%g") +
+                          " s and are skipped: --no-color uses them without, --max-dt allows another difference");
+}
+
 SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   SequenceListing listing;
   listing.depth_scale = 5000;
@@ -65,11 +123,6 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   std::sort(ascending_depth_stamps.begin(), ascending_depth_stamps.end());
   const std::vector<double> color_stamps = sort_by_stamp(color), pose_stamps = sort_by_stamp(poses);
 
-  const auto stamp_text = [](double stamp_s) {
-    char text[40];
-    std::snprintf(text, sizeof text, "%.6f", stamp_s);
-    return std::string(text);
-  };
   for (size_t i = 0; i < depth.size(); ++i) {
     FrameRecord frame;
     frame.index = int64_t(i);
@@ -78,9 +131,10 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
     const auto refuse = [&](const std::string& reason, const std::string& what) {
       if (!frame.fault.empty()) return;
       frame.fault = reason;
-      frame.fault_detail = (path / "depth.txt").string() + ": stamp " + stamp_text(frame.stamp_s) + ": " + what;
+      frame.fault_detail =
+          (path / "depth.txt").string() + ": stamp " + number_text(frame.stamp_s, "%.6f") + ": " + what;
     };
-    const std::string within = " within " + std::to_string(options.max_dt_s) + " s";
+    const std::string within = " within " + number_text(options.max_dt_s, "%g") + " s";
     if (disordered[i]) refuse("stamp out of order", "not after the stamps before it");
     frame.pose = pose_at_stamp(poses, pose_stamps, frame.stamp_s - options.pose_stamp_offset, options.max_dt_s);
     if (!frame.pose) refuse("missing pose", "no pose" + within);
@@ -91,23 +145,25 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
     if (its_depth >= 0 && ascending_depth_stamps[size_t(its_depth)] == frame.stamp_s)
       frame.color.path = color[size_t(partner)].path;
     else if (options.read_color && !color.empty())
-      refuse("missing colour image",
-             partner < 0 ? "no colour image" + within : "the nearest colour image belongs to another depth image");
+      refuse(kMissingColor,
+             (partner < 0 ? "no colour image" + within : "the nearest colour image belongs to another depth image") +
+                 " (--no-color does without)");
     listing.frames.push_back(std::move(frame));
   }
-  if (!options.intrinsics) {
-    const fs::path camera =
-        first_existing(path, {"camera-intrinsics.txt", "intrinsics.txt", "camera.yaml", "calibration.txt"});
-    if (!camera.empty()) {
-      const CameraFile file = read_camera_file(camera);
-      listing.intrinsics = file.intrinsics;
-      listing.width = file.width, listing.height = file.height;
-      if (file.depth_scale > 0) listing.depth_scale = file.depth_scale;
-    } else {
-      listing.intrinsics = Intrinsics{525, 525, 319.5, 239.5};
-      listing.notes.push_back(
-          "no camera file: the TUM benchmark's default for registered images (525, 525, 319.5, 239.5) is assumed");
-    }
+  note_stamps_without_pose(path / "groundtruth.txt", ascending_depth_stamps, pose_stamps, options, listing);
+  note_depth_without_color(options, listing);
+  const fs::path camera =
+      first_existing(path, {"camera-intrinsics.txt", "intrinsics.txt", "camera.yaml", "calibration.txt"});
+  // Only YAML can state more than the intrinsics that were given.
+  if (!camera.empty() && (!options.intrinsics || camera.extension() == ".yaml")) {
+    const CameraFile file = read_camera_file(camera);
+    if (!options.intrinsics) listing.intrinsics = file.intrinsics;
+    listing.width = file.width, listing.height = file.height;
+    if (file.depth_scale > 0) listing.depth_scale = file.depth_scale;
+  } else if (!options.intrinsics) {
+    listing.intrinsics = Intrinsics{525, 525, 319.5, 239.5};
+    listing.notes.push_back(
+        "no camera file: the TUM benchmark's default for registered images (525, 525, 319.5, 239.5) is assumed");
   }
   return listing;
 }

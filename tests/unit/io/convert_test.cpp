@@ -85,7 +85,82 @@ TEST_CASE("a conversion keeps stamps where the layout has a place for them, or s
     for (int64_t i = 0; i < 4; ++i) CHECK(converted->name(i).stamp_s == Approx(reader->name(i).stamp_s).margin(1e-6));
   }
   CHECK(convert_sequence(*reader, folder.path() / "icl", {.layout = "icl"}).left_out ==
-        std::vector<std::string>{"stamps"});
+        std::vector<std::string>{"depth steps finer than 1 mm", "stamps"});
+}
+
+TEST_CASE("another depth scale is stated where the layout can state one, and refused where it cannot") {
+  TemporaryDirectory folder;
+  write_generic(folder.path() / "recording", 2);
+  const auto original = open_sequence(folder.path() / "recording");
+  for (const std::string& layout : writable_layouts()) {
+    INFO(layout);
+    const fs::path out = folder.path() / layout;
+    const ConvertOptions options{.layout = layout, .depth_scale = 2500};
+    if (layout == "7scenes" || layout == "icl") {
+      CHECK_THROWS_AS(convert_sequence(*original, out, options), ConfigError);
+      CHECK_FALSE(fs::exists(out));
+      CHECK(convert_sequence(*original, out, {.layout = layout, .depth_scale = 1000}).left_out.empty());
+      continue;
+    }
+    convert_sequence(*original, out, options);
+    for (const SequenceOptions& reading : {SequenceOptions{}, {.intrinsics = Intrinsics{21, 21, 11.5, 7.5}}}) {
+      const auto converted = open_sequence(out, reading);
+      CHECK(converted->info().depth_scale == 2500);
+      CHECK(frame_of(*converted, 1).depth_m(7, 3) == Approx(depth_m_at(1, 7)).margin(0.51 / 2500));
+    }
+    CHECK(open_sequence(out)->info().camera == original->info().camera);
+  }
+}
+
+TEST_CASE("a depth scale at which most of the measured depth is lost is an error that leaves nothing behind") {
+  TemporaryDirectory folder;
+  write_generic(folder.path() / "recording", 1);  // from 1 m to 1.23 m
+  const auto reader = open_sequence(folder.path() / "recording");
+  const fs::path out = folder.path() / "out";
+  CHECK_THROWS_WITH(convert_sequence(*reader, out, {.depth_scale = 60000}),
+                    Catch::Contains("384 measured pixels") && Catch::Contains("1.09 m"));
+  CHECK_THROWS_AS(convert_sequence(*reader, out, {.depth_scale = 0.1}), FormatError);
+  CHECK_FALSE(fs::exists(out));
+  const ConvertResult result = convert_sequence(*reader, out, {.depth_scale = 55000});  // up to 1.19 m
+  CHECK(result.depth_measured == kWidth * kHeight);
+  CHECK(result.depth_out_of_range == 4 * kHeight);
+}
+
+TEST_CASE("what suits the sensor goes with a generic sequence, and is named where a layout cannot say it") {
+  TemporaryDirectory folder;
+  const fs::path recording = folder.path() / "recording";
+  write_generic(recording, 1);
+  const std::string description = read_whole_file(recording / "sequence.yaml");
+  write_text(recording / "sequence.yaml", description + "voxel_size: 0.2\nmax_depth: 80\n");
+  const auto reader = open_sequence(recording);
+  CHECK(convert_sequence(*reader, folder.path() / "generic", {}).left_out.empty());
+  const auto converted = open_sequence(folder.path() / "generic");
+  CHECK(converted->info().voxel_size_m == 0.2);
+  CHECK(converted->info().max_depth_m == 80);
+  CHECK(convert_sequence(*reader, folder.path() / "replica", {.layout = "replica"}).left_out ==
+        std::vector<std::string>{"the voxel size that suits the sensor", "the depth that the sensor reaches to"});
+  write_text(recording / "sequence.yaml", description + "voxel_size: -1\nmax_depth: .inf\n");
+  CHECK_THROWS_WITH(open_sequence(recording), Catch::Contains("voxel_size") && Catch::Contains("max_depth"));
+}
+
+TEST_CASE("depth that a layout stores more coarsely than the sequence is named, unless it was asked for") {
+  TemporaryDirectory folder;
+  write_tum(folder.path() / "recording", 1);
+  const auto reader = open_sequence(folder.path() / "recording");
+  const auto names_it = [&](const std::string& name, const ConvertOptions& options) {
+    const std::vector<std::string> left_out = convert_sequence(*reader, folder.path() / name, options).left_out;
+    return std::count(left_out.begin(), left_out.end(), "depth steps finer than 1 mm") == 1;
+  };
+  for (const char* layout : {"7scenes", "icl", "redwood"}) CHECK(names_it(layout, {.layout = layout}));
+  CHECK_FALSE(names_it("replica", {.layout = "replica"}));
+  CHECK_FALSE(names_it("asked", {.layout = "redwood", .depth_scale = 1000}));
+}
+
+TEST_CASE("a conversion without any frame says why there is none") {
+  TemporaryDirectory folder;
+  write_tum(folder.path() / "recording", 3);
+  const auto reader = open_sequence(folder.path() / "recording", {.max_dt_s = 0.001});
+  CHECK_THROWS_WITH(convert_sequence(*reader, folder.path() / "out", {}), Catch::Contains("3 missing pose"));
 }
 
 TEST_CASE("depth that does not fit into 16 bits is counted and stored as missing") {

@@ -3,6 +3,9 @@
 #include <catch2/catch.hpp>
 
 #include "bench/support/corrupt.h"
+#include "io/doctor/geometry_findings.h"
+#include "io/doctor/label_check.h"
+#include "io/doctor/sample.h"
 #include "tests/support/data.h"
 
 using namespace felt;
@@ -14,10 +17,15 @@ namespace {
 /// A room with every kind of image: 24 small noisy views of it.
 fs::path room() { return source_dir() / "data" / "scenes" / "room"; }
 
-const Finding* accused(const Examination& examination, const std::string& topic) {
+const Finding* finding_of(const Examination& examination, const std::string& topic) {
   for (const Finding& finding : examination.findings)
-    if (finding.faulty && finding.topic == topic) return &finding;
+    if (finding.topic == topic) return &finding;
   return nullptr;
+}
+
+const Finding* accused(const Examination& examination, const std::string& topic) {
+  const Finding* finding = finding_of(examination, topic);
+  return finding != nullptr && finding->faulty ? finding : nullptr;
 }
 
 std::string accused_topics(const Examination& examination) {
@@ -44,6 +52,15 @@ struct FaultyRoom {
   fs::path path;
   std::string topic;
 };
+
+/// The stored room with its poses changed one by one.
+template <typename Change>
+fs::path room_with_poses(const fs::path& folder, const Change& change) {
+  corrupt::Copy copy = corrupt::sound_copy(room(), folder / "base", 16);
+  for (size_t i = 0; i < copy.pose.size(); ++i) change(copy.pose[i], i);
+  corrupt::write(copy, folder / "changed");
+  return folder / "changed";
+}
 
 }  // namespace
 
@@ -102,4 +119,107 @@ TEST_CASE("a sequence is sound to the doctor once it is read with the option it 
   CHECK(accused(examine_quickly(room.path), "pose-convention") != nullptr);
   const SequenceOptions mended{.pose_convention = PoseConvention{.world_to_camera = true}};
   CHECK(accused_topics(examine_sequence(room.path, mended)) == "");
+}
+
+TEST_CASE("the doctor's remedies count from what is told already, so that they can be given in its place") {
+  const auto remedy = [](const SequenceOptions& told, const char* topic) {
+    const Examination examination = examine_sequence(room(), told);
+    INFO(topic << ": " << accused_topics(examination));
+    const Finding* finding = accused(examination, topic);
+    REQUIRE(finding != nullptr);
+    return finding->remedy;
+  };
+  CHECK(remedy({.bgr = true}, "color-order") == "leave out --bgr");
+  CHECK(remedy({.depth_is_ray_length = true}, "depth-along") == "--no-ray-length");
+  const std::string offset = remedy({.pose_stamp_offset = 1}, "stamp-offset"), option = "--stamp-offset ";
+  REQUIRE_THAT(offset, Catch::StartsWith(option));
+  CHECK(std::abs(std::stod(offset.substr(option.size()))) < 0.2);
+}
+
+TEST_CASE("the doctor's label offset counts from the one that is told") {
+  // A wall across the view, whose labels are one above their class.
+  GeometrySample sample;
+  sample.camera = {.fx = 60, .fy = 60, .cx = 31.5, .cy = 23.5, .width = 64, .height = 48};
+  sample.frames.emplace_back();
+  sample.frames[0].depth_m = DepthImage(64, 48, 2.0f);
+  sample.frames[0].labels = LabelImage(64, 48, uint16_t(6));
+  sample.trajectory.position = {0};
+  sample.trajectory.recorded = {Eigen::Isometry3d::Identity()};
+  const ClassTable classes({{.id = 5, .name = "wall", .color = {}}});
+  const auto remedy = [&](int told) { return check_labels(sample, {}, classes, told)->remedy; };
+  CHECK(remedy(0) == "--label-offset -1");
+  CHECK(remedy(3) == "--label-offset 2");
+  CHECK(remedy(1) == "leave out --label-offset");
+}
+
+TEST_CASE("a camera exchanged against the evidence is not named, though it were the best") {
+  SequenceListing listing = list_sequence(room());
+  GeometrySample sample = take_sample(room(), {}, listing, {}).geometry;
+  // The exchange takes the principal point nowhere, and tells nothing else.
+  sample.camera.cx = sample.camera.cy = (sample.camera.cx + sample.camera.cy) / 2;
+  Reading best = sample.now;
+  best.swapped_camera = true;
+  bool looked_at = false;
+  for (const Finding& finding : geometry_findings(sample, best, false)) {
+    if (finding.topic != "image-size") continue;
+    looked_at = true;
+    CHECK_FALSE(finding.faulty);
+    CHECK(finding.remedy.empty());
+  }
+  CHECK(looked_at);
+}
+
+TEST_CASE("an assumed focal length that is wrong is no camera with width and height exchanged") {
+  FELTMAP_REQUIRE_DATA(recording, "icl_livingroom_maskrcnn");
+  const TemporaryDirectory folder;
+  corrupt::sound_copy(recording, folder.path() / "few", 5);
+  for (const double fx : {481.2, 420.0})
+    CHECK(accused_topics(examine_quickly(folder.path() / "few", {.intrinsics = Intrinsics{fx, 480, 319.5, 239.5}})) ==
+          "");
+}
+
+TEST_CASE("quaternions written w x y z are told from poses of another convention") {
+  const TemporaryDirectory folder;
+  const fs::path path = room_with_poses(folder.path(), [](Eigen::Isometry3d& T, size_t) {
+    const Eigen::Quaterniond q(T.linear());
+    T.linear() = Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y()).toRotationMatrix();
+  });
+  CHECK(accused_topics(examine_sequence(path)) == "quaternions ");
+  CHECK(accused_topics(examine_quickly(path)) == "quaternions ");
+}
+
+TEST_CASE("where no reading fits, the doctor accuses no part of it") {
+  const TemporaryDirectory folder;
+  const fs::path path = room_with_poses(folder.path(), [](Eigen::Isometry3d& T, size_t i) {
+    T.translation() += 0.8 * std::sin(5.0 * double(i)) * T.linear().col(2);
+    T.linear() = T.linear() * Eigen::AngleAxisd(2.4 * double(i), Eigen::Vector3d::UnitZ());
+  });
+  const Examination examination = examine_sequence(path);
+  CHECK(accused_topics(examination) == "fit trajectory ");
+  CHECK(accused_topics(examine_quickly(path)) == "fit ");
+  for (const char* part : {"pose-convention", "camera-axes", "depth-scale", "depth-along", "focal-length"})
+    CHECK(finding_of(examination, part) == nullptr);
+}
+
+TEST_CASE("few frames tell no delay, and the doctor says so") {
+  const TemporaryDirectory folder;
+  corrupt::sound_copy(room(), folder.path() / "few", 7);
+  const Examination examination = examine_sequence(folder.path() / "few");
+  const Finding* finding = finding_of(examination, "stamp-offset");
+  REQUIRE(finding != nullptr);
+  CHECK_FALSE(finding->faulty);
+  CHECK(finding->confidence == 0.5);
+  CHECK_THAT(finding->belief, Catch::Contains("cannot be told from 7 frames"));
+}
+
+TEST_CASE("scans without poses want a pose file, not another copy") {
+  const TemporaryDirectory folder;
+  for (const char* name : {"000000.bin", "000001.bin"}) {
+    const std::string points(32, name[5]);
+    write_bytes(folder.path() / name, {points.begin(), points.end()});
+  }
+  const Examination examination = examine_sequence(folder.path());
+  const Finding* finding = accused(examination, "frames");
+  REQUIRE(finding != nullptr);
+  CHECK_THAT(finding->remedy, Catch::StartsWith("add poses.txt"));
 }

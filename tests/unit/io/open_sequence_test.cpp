@@ -145,7 +145,10 @@ TEST_CASE("the pose convention and the depth scale can be told") {
   CHECK(pose_as("world-to-camera").isApprox(recorded.inverse(), 1e-9));
   CHECK(pose_as("c2w,opengl").isApprox(recorded * mirror.asDiagonal(), 1e-9));
   CHECK(pose_as("w2c,opengl").isApprox(recorded.inverse() * mirror.asDiagonal(), 1e-9));
-  CHECK_THROWS_AS(parse_pose_convention("camera_to_world", "--pose-convention"), ConfigError);
+  for (const char* wrong : {"camera_to_world", "C2W", "c2w,w2c", "world-to-camera,opengl,opencv", ""})
+    CHECK_THROWS_WITH(parse_pose_convention(wrong, "--pose-convention"),
+                      Catch::Contains("c2w") && Catch::Contains("w2c") && Catch::Contains("opengl"));
+  CHECK(parse_pose_convention("w2c,world-to-camera", "--pose-convention").world_to_camera);
   CHECK(frame_of(*open_sequence(folder.path(), {.depth_scale = 2000.0}), 0).depth_m(0, 0) == 0.5f);
   CHECK_THROWS_AS(open_sequence(folder.path(), {.depth_scale = 0.0}), ConfigError);
 }
@@ -335,6 +338,57 @@ TEST_CASE("TUM streams are matched by nearest stamp within the largest differenc
     write_text(folder.path() / "groundtruth.txt", "100.000 0 0 0 0 0 0 0\n");
     CHECK(skip_of(*open_sequence(folder.path()), 0).reason == "non-finite pose");
   }
+}
+
+TEST_CASE("stamps of TUM's layout that do not match are explained: ranges, difference, unit, options") {
+  TemporaryDirectory folder;
+  write_tum(folder.path(), 4);
+  CHECK(open_sequence(folder.path())->info().notes.empty());
+  const auto note_with = [&](const char* poses, const SequenceOptions& options) -> std::string {
+    write_text(folder.path() / "groundtruth.txt", poses);
+    const auto reader = open_sequence(folder.path(), options);
+    return reader->info().notes.empty() ? "" : reader->info().notes.front();
+  };
+  CHECK_THAT(note_with("100004000000 1 2 3 0 0 0 1\n100304000000 1 2 3 0 0 0 1\n", {}),
+             Catch::Contains("within 0.02 s") && Catch::Contains("100 to 100.3") &&
+                 Catch::Contains("100004000000 to 100304000000") && Catch::Contains("4 of 4") &&
+                 Catch::Contains("stamps of poses in nanoseconds?") && Catch::Contains("--stamp-offset") &&
+                 Catch::Contains("--max-dt"));
+  const char* later = "107.5 1 2 3 0 0 0 1\n108 1 2 3 0 0 0 1\n";
+  CHECK_THAT(note_with(later, {}), Catch::Contains("smallest difference 7.2 s;"));
+  CHECK_THAT(note_with(later, {.pose_stamp_offset = -3}),
+             Catch::Contains("104.5 to 105") && Catch::Contains("smallest difference 4.2 s"));
+  CHECK(note_with(later, {.max_dt_s = 0.2, .pose_stamp_offset = -7.5}).empty());
+}
+
+TEST_CASE("depth images without colour partner name the option that does without") {
+  TemporaryDirectory folder;
+  write_tum(folder.path(), 4);
+  write_text(folder.path() / "rgb.txt", "100.003000 rgb/100.003000.png\n");
+  const auto reader = open_sequence(folder.path());
+  CHECK_THAT(skip_of(*reader, 2).detail, Catch::Contains("--no-color"));
+  REQUIRE(reader->info().notes.size() == 1);
+  CHECK_THAT(reader->info().notes[0], Catch::Contains("3 of 4") && Catch::Contains("--no-color"));
+  CHECK(open_sequence(folder.path(), {.read_color = false})->info().notes.empty());
+}
+
+TEST_CASE("a negative fy is refused with what to do about it") {
+  TemporaryDirectory folder;
+  write_icl(folder.path() / "icl", 1);
+  write_text(folder.path() / "icl" / "intrinsics.txt", "20 0 11.5\n0 -20 7.5\n0 0 1\n");
+  write_generic(folder.path() / "generic", 1);
+  write_text(folder.path() / "generic" / "sequence.yaml",
+             "camera: {fx: 20, fy: -20, cx: 11.5, cy: 7.5, width: 24, height: 16}\n");
+  const auto hint = Catch::Contains("poses mirrored alike");
+  for (const char* layout : {"icl", "generic"}) CHECK_THROWS_WITH(open_sequence(folder.path() / layout), hint);
+  CHECK_THROWS_WITH(parse_intrinsics("20,-20,11.5,7.5", "--intrinsics"), hint);
+  CHECK_THROWS_WITH(parse_intrinsics("20,0,11.5,7.5", "--intrinsics"), !hint);
+  // The mirrored poses give the mirrored points.
+  const Eigen::Matrix4d M = Eigen::Vector4d(1, -1, 1, 1).asDiagonal();
+  const Eigen::Isometry3d T = pose_at(1);
+  const Eigen::Quaterniond q(T.linear());
+  const double n[] = {T.translation().x(), -T.translation().y(), T.translation().z(), -q.x(), q.y(), -q.z(), q.w()};
+  CHECK(matrix_of_translation_quaternion(n).isApprox(M * T.matrix() * M, 1e-12));
 }
 
 TEST_CASE("stamps that break the order are as few as can be") {

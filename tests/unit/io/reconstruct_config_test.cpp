@@ -47,7 +47,7 @@ TEST_CASE("every problem of a configuration is reported at once with its line an
   write_text(
       file,
       "voxel_size: 0\nvoxelsize: 1\ntruncation: wide\nmax_depth: [1, 2]\nframes: 5\nweight: heavy\ncarve: maybe\n"
-      "threads: 0\nlabels: nowhere\nmax_dt: 0,02\nmax_depth: 3\nintrinsics: [1, 2]\n");
+      "threads: -1\nlabels: nowhere\nmax_dt: 0,02\nmax_depth: 3\nintrinsics: [1, 2]\n");
   try {
     read_reconstruct_config(file);
     FAIL("was accepted");

@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "io/doctor/doctor.h"
+#include "io/doctor/file_check.h"
 #include "io/images/image_decode.h"
 #include "io/images/image_encode.h"
 #include "io/sequence/convert.h"
@@ -107,6 +108,43 @@ TEST_CASE("stamps of a container count where they ascend; frame numbers stand fo
   CHECK(frame_of(*reader, 2).stamp_s == 2);
   convert_sequence(*reader, folder.path() / "tum", {.layout = "tum"});
   CHECK(std::holds_alternative<Frame>(open_sequence(folder.path() / "tum")->read(2)));
+}
+
+TEST_CASE("a container cut short keeps its whole frames, and those that it lost are counted") {
+  TemporaryDirectory folder;
+  const fs::path path = folder.path() / "a.sens";
+  const std::string whole = sens_container({1000000, 1040000, 1080000, 1120000, 1160000});
+  constexpr size_t kFrameHeaderBytes = 96, kFrameBytes = kFrameHeaderBytes + 2 * kWidth * kHeight;
+  const size_t two_frames = whole.size() - 3 * kFrameBytes;
+  write_text(path, whole);
+  CHECK(open_sequence(path)->info().notes.empty());
+  for (const size_t more : {size_t(0), size_t(40), kFrameHeaderBytes + 100}) {
+    INFO(more);
+    write_text(path, whole.substr(0, two_frames + more));
+    const auto reader = open_sequence(path);
+    REQUIRE(reader->size() == 5);
+    REQUIRE(reader->info().notes.size() == 1);
+    CHECK_THAT(reader->info().notes[0], Catch::Contains("5 frames") && Catch::Contains("after 2"));
+    CHECK(frame_of(*reader, 1).stamp_s == Approx(1.04));
+    for (int64_t i = 2; i < 5; ++i) {
+      const ReadResult read = reader->read(i);
+      const auto* skip = std::get_if<SkippedFrame>(&read);
+      REQUIRE(skip != nullptr);
+      CHECK(skip->reason == (more > kFrameHeaderBytes && i == 2 ? "truncated depth image" : "missing depth image"));
+    }
+    const Finding finding = check_files(list_sequence(path, {})).front();
+    CHECK(finding.topic == "frames");
+    CHECK(finding.faulty);
+    CHECK_THAT(finding.belief, Catch::Contains("3 frames"));
+  }
+  // A count that is nonsense does not list frames without end.
+  std::string endless = whole;
+  endless[whole.size() - 5 * kFrameBytes - 1] = '\x10';  // the highest byte of the number of frames
+  write_text(path, endless);
+  CHECK(open_sequence(path)->size() <= 10005);
+  // Nothing whole: said, not opened.
+  write_text(path, whole.substr(0, whole.size() - 5 * kFrameBytes + 200));
+  CHECK_THROWS_WITH(open_sequence(path), Catch::Contains("ends"));
 }
 
 TEST_CASE("depth that was no whole numbers is written in millimetres") {

@@ -153,6 +153,11 @@ TEST_CASE("a labelled mesh is evaluated as the map that it shows") {
   LabelScores swapped(3);
   add_surface(swapped, map, VoxelBeliefs(map), LabelledMesh(mesh, "label", "mesh"), classes, options, nullptr);
   CHECK(swapped.counts.pixel_accuracy() < 0.02);
+  // Labels of triangles come first where they bear the name, and no other name stands for those of vertices.
+  mesh.triangle_scalars.push_back({"material", std::vector<float>(mesh.triangles.size(), 7.0f)});
+  CHECK(LabelledMesh(mesh, "material", "mesh").label(0, {0, 0, 0}) == 7);
+  CHECK(LabelledMesh(mesh, "label", "mesh").label(0, {0, 0, 0}) != 7);
+  CHECK_THROWS_AS(LabelledMesh(mesh, "materials", "mesh"), Error);
   mesh.labels.clear();
   CHECK_THROWS_AS(LabelledMesh(mesh, "label", "mesh"), Error);
 }
