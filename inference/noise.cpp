@@ -106,7 +106,9 @@ public:
     return std::min(0.0, -std::log(largest * plug_in_precision_)) - 2;
   }
   double highest_mode() const { return std::log1p(double(psi_.size()) / (2 * prior_.beta)); }
-  double natural_width() const { return 1 / std::sqrt(prior_.beta + 0.5 * double(psi_.size())); }
+  // Three times the least standard deviation that the density can have: a Gaussian across as much is a polynomial to
+  // the rule's twenty nodes.
+  double panel_width() const { return 3 / std::sqrt(prior_.beta + 0.5 * double(psi_.size())); }
   double plug_in_precision() const { return plug_in_precision_; }
 
 private:
@@ -126,7 +128,7 @@ struct Panels {
 constexpr size_t kMostPanels = 1'000'000;  // thousands of times what sound priors and readings take
 
 Panels choose_panels(const PrecisionPosterior& posterior) {
-  const double width = posterior.natural_width();
+  const double width = posterior.panel_width();
   std::vector<double> edge, value;
   double peak = posterior.at(0).log_density;
   const auto march = [&](double from, double step, double last_mode) {

@@ -86,13 +86,16 @@ TouchedLabels::Answer TouchedLabels::of(const Region& region) {
     if (known.pooled.empty()) known.pooled = pooled_belief(map_, known.reach);
     known.label = int16_t(most_probable_class(beliefs_.evaluate(known.pooled, group.touches).classes.p));
   });
-  for (const auto& [g, shared] : here)
+  for (const auto& part : here) {
+    const Region& shared = part.second;
+    const int16_t label = *known_[part.first].label;
     for (size_t s = 0; s < shared.blocks(); ++s) {
       const size_t b = size_t(region.find(shared.coord[s]) - region.mask.data());
-      visit(b, [&, label = *known_[g].label](int16_t& at, int i) {
+      visit(b, [&](int16_t& at, int i) {
         if (shared.mask[s].test(i)) at = label;
       });
     }
+  }
 
   const MixtureState mixed = mixture_state(map_, region);
   out.refused = mixed.refused;
