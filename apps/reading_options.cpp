@@ -73,7 +73,7 @@ SequenceOptions resolve(const ReadingArguments& a, SequenceOptions reading, std:
   if (a.ray_length) reading.depth_is_ray_length = a.ray_length;
   if (a.max_dt_s) reading.max_dt_s = *a.max_dt_s;
   if (a.stamp_offset) reading.pose_stamp_offset = *a.stamp_offset;
-  if (a.label_offset != 0) reading.label_offset = a.label_offset;
+  if (a.label_offset) reading.label_offset = *a.label_offset;
   if (a.bgr) reading.bgr = *a.bgr;
   if (a.no_color) reading.read_color = !*a.no_color;
   const auto expect = [&](bool good, const std::string& where, const std::string& what, double found) {

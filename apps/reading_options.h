@@ -18,7 +18,7 @@ struct ReadingArguments {
   std::optional<bool> ray_length, no_color, bgr;
   std::optional<double> stamp_offset;
   std::string distortion, body_camera;
-  int label_offset = 0;
+  std::optional<int> label_offset;
 };
 
 /// Adds the options in a group of the help.
