@@ -48,7 +48,10 @@ void check(const ExportOptions& o) {
   if (!o.box_m.empty() && !(o.box_m[0] < o.box_m[3] && o.box_m[1] < o.box_m[4] && o.box_m[2] < o.box_m[5]))
     problems.push_back(describe_mismatch("--box", "corners in metres", "x0,y0,z0,x1,y1,z1 with x0 < x1 and so on",
                                          nlohmann::json(o.box_m).dump()));
-  std::map<fs::path, std::string> uses = {{fs::weakly_canonical(o.map), "the map that is read"}};
+  // A whole map may be written anew in its place (--compact); a part, or a picture of it, would be all that is left.
+  const bool whole = o.class_name.empty() && o.box_m.empty() && o.segment_at.empty() && !o.half && o.grids.empty();
+  std::map<fs::path, std::string> uses;
+  if (!whole || o.vdb.empty()) uses[fs::weakly_canonical(o.map)] = "the map that is read";
   for (const auto& [option, file] :
        {std::pair("--vdb", o.vdb), {"--mesh", o.mesh}, {"--points", o.points}, {"--html", o.html}})
     if (!file.empty())
