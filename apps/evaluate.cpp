@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <set>
 
 #include "apps/camera_options.h"
 #include "apps/command.h"
@@ -10,6 +11,7 @@
 #include "apps/number_checks.h"
 #include "apps/output_files.h"
 #include "apps/progress.h"
+#include "apps/run_settings.h"
 #include "apps/touch_options.h"
 #include "core/error.h"
 #include "io/map_file/map_file.h"
@@ -35,7 +37,7 @@ struct EvaluateCommand {
   bool class_images = false;
   GeometryOptions geometry;
   ObservingCameras cameras;
-  CLI::Option* intrinsics = nullptr;
+  CLI::Option *intrinsics = nullptr, *min_depth = nullptr, *max_depth = nullptr;
 };
 
 /// What is evaluated: a map, or a mesh, or the map's mesh where geometry is asked for.
@@ -208,6 +210,13 @@ void print_labels(const LabelScores& s, const char* of) {
                 s.images.ssim(), s.images.binary_cross_entropy());
 }
 
+void require_depth_range(const ObservingCameras& cameras) {
+  if (cameras.max_depth_m > cameras.min_depth_m) return;
+  throw ConfigError(describe_mismatch("evaluate", "--max-depth, metres",
+                                      "a number above --min-depth, " + Json(cameras.min_depth_m).dump(),
+                                      Json(cameras.max_depth_m).dump()));
+}
+
 void check(const EvaluateCommand& c) {
   std::vector<std::string> problems;
   const auto need = [&](bool good, const char* option, const char* expected) {
@@ -229,20 +238,29 @@ void check(const EvaluateCommand& c) {
   need(c.reference_readings.empty() || is_map, "--reference-readings", "a map (.vdb)");
   need(!c.class_images || (is_map && !c.reference_labels.empty()), "--class-images",
        "a map (.vdb) and --reference-labels");
-  if (c.cameras.max_depth_m <= c.cameras.min_depth_m)
-    problems.push_back(describe_mismatch("evaluate", "--max-depth, metres",
-                                         "a number above --min-depth, " + Json(c.cameras.min_depth_m).dump(),
-                                         Json(c.cameras.max_depth_m).dump()));
   if (!problems.empty()) throw ConfigError(problems);
+  require_depth_range(c.cameras);
+}
+
+/// The range of depth that all frames of the map were fused with, where none was given.
+void adopt_depth_range(EvaluateCommand& command, const Map& map) {
+  const auto adopt = [&](const CLI::Option* given, const char* key, double& value) {
+    const std::set<double> fused = numbers_of_runs({&map, 1}, key);
+    if (given->count() == 0 && fused.size() == 1) value = *fused.begin();
+  };
+  adopt(command.min_depth, "min_depth_m", command.cameras.min_depth_m);
+  adopt(command.max_depth, "max_depth_m", command.cameras.max_depth_m);
+  require_depth_range(command.cameras);
 }
 
 int evaluate(EvaluateCommand& command) {
   check(command);
   if (!command.trajectory.empty()) read_cameras(command);
   Evaluated evaluated;
-  if (fs::path(command.input).extension() == ".vdb")
+  if (fs::path(command.input).extension() == ".vdb") {
     evaluated.map = load_map(command.input);
-  else
+    adopt_depth_range(command, *evaluated.map);
+  } else
     evaluated.mesh = read_mesh(command.input);
   Json json = {{"input", command.input}};
   Json definitions;
@@ -341,12 +359,12 @@ void add_evaluate(CLI::App& app) {
       ->group(geometry);
   add_camera_options(sub, command.camera);
   command.intrinsics = sub.get_option("--intrinsics");
-  sub.add_option("--min-depth", command.cameras.min_depth_m, "Metres, of the recording")
-      ->check(at_least_zero())
-      ->capture_default_str();
-  sub.add_option("--max-depth", command.cameras.max_depth_m, "Metres, of the recording as fused")
-      ->check(above_zero())
-      ->capture_default_str();
+  command.min_depth = sub.add_option("--min-depth", command.cameras.min_depth_m,
+                                     "Metres, of the recording [as the map was fused, else 0.1]")
+                          ->check(at_least_zero());
+  command.max_depth = sub.add_option("--max-depth", command.cameras.max_depth_m,
+                                     "Metres, of the recording [as the map was fused, else 4]")
+                          ->check(above_zero());
 
   const char* labels = "Labels";
   sub.add_option("--reference-labels", command.reference_labels, "Sequence with true labels, in the map's world frame")
@@ -368,7 +386,7 @@ void add_evaluate(CLI::App& app) {
   sub.add_option("--reference-readings", command.reference_readings,
                  "Readings that the map was not given (as touches.csv): how good are its forecasts?")
       ->group(properties);
-  sub.add_option("--properties", command.properties, "Property table (YAML), for a map that has none")
+  sub.add_option("--properties", command.properties, "Property table (YAML), instead of the one that the map may have")
       ->group(properties);
 }
 

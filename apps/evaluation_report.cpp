@@ -151,7 +151,8 @@ Json property_json(const PropertyScores& s) {
 }
 
 Json property_definitions() {
-  return {{"mae", "mean |location of the forecast - reading|; the location is the forecast's mean where that exists"},
+  return {{"readings", "as recorded: their own noise (sigma) is not added to the forecasts"},
+          {"mae", "mean |location of the forecast - reading|; the location is the forecast's mean where that exists"},
           {"nll", "mean of -ln of the forecast's density at the reading, nats (depends on the unit)"},
           {"crps",
            "continuous ranked probability score, unit of the property: twice the mean pinball loss over 200 quantiles "

@@ -187,7 +187,7 @@ void add_export(CLI::App& app) {
   command.add_flag("--compact", o->compact, "A map file of least size: DEFLATE, and no grids that only viewers need");
   command.add_option("--color-by", o->color_by, "rgb, class, entropy, <property>.mean or <property>.sd")
       ->capture_default_str();
-  command.add_option("--properties", o->properties, "Property table (YAML), for a map that has none");
+  command.add_option("--properties", o->properties, "Property table (YAML), instead of the one that the map may have");
   const char* part = "Part (several: what they have in common)";
   command.add_option("--class", o->class_name, "Only where this is the most probable class")->group(part);
   command.add_option("--box", o->box_m, "Only what lies in x0,y0,z0,x1,y1,z1, metres")

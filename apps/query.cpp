@@ -156,7 +156,8 @@ void add_query(CLI::App& app) {
       ->check(check_point)
       ->allow_extra_args(false);
   where.add_option("--file", options->file, "Points: one x,y,z a line");
-  command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
+  command.add_option("--properties", options->properties,
+                     "Property table (YAML), instead of the one that the map may have");
   command.add_option("--below", options->below, "Probability that a property is at most this")->check(finite());
 }
 

@@ -69,7 +69,8 @@ void add_region(CLI::App& app) {
   command.add_option("map", options->map, "Map file")->required();
   command.add_option("--at", options->at, "World point, metres: x,y,z")->check(check_point)->required();
   command.add_option("--mesh", options->mesh, "Write the region's surface (.ply, .obj, .glb)");
-  command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
+  command.add_option("--properties", options->properties,
+                     "Property table (YAML), instead of the one that the map may have");
   command.add_option("--below", options->below, "Probability that a property is at most this")->check(finite());
   options->region.add_to(command);
 }

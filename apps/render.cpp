@@ -235,7 +235,7 @@ void add_render(CLI::App& app) {
   sub.add_option("IMAGES", command.more_images, "Further words after --images")->delimiter(',')->group("");
   sub.add_flag("--colored", command.colored,
                "Also write class, entropy and property images in colour, to look at: <number>.<image>.color.png");
-  sub.add_option("--properties", command.properties, "Property table (YAML), for a map that has none");
+  sub.add_option("--properties", command.properties, "Property table (YAML), instead of the one that the map may have");
   add_camera_options(sub, command.camera);
   sub.add_option("--max-depth", command.options.max_depth_m, "Metres along the optical axis")
       ->check(above_zero())

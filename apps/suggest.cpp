@@ -79,7 +79,8 @@ void add_suggest(CLI::App& app) {
                                   *options, [options] { return run_suggest(*options); });
   command.add_option("map", options->map, "Map file")->required();
   command.add_option("--property", options->property, "What would be measured")->required();
-  command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
+  command.add_option("--properties", options->properties,
+                     "Property table (YAML), instead of the one that the map may have");
   command.add_option("--top", options->settings.most, "How many segments to name")->check(above_zero());
   command.add_option("--region", options->rule, "connected: what a touch would update; segment: the map's segments")
       ->check(CLI::IsMember({"connected", "segment"}))

@@ -306,8 +306,8 @@ void add_touch(CLI::App& app) {
   CLI::Option* rho =
       command.add_option("--rho", options->rho, "Correlation of readings within a region, instead of the property's")
           ->check(from_zero_to_below(1));
-  CLI::Option* properties =
-      command.add_option("--properties", options->properties, "Property table (YAML), for a map that has none");
+  CLI::Option* properties = command.add_option("--properties", options->properties,
+                                               "Property table (YAML), instead of the one that the map may have");
   CLI::Option* out = command.add_option("--out", options->out, "Write here instead of in place");
   CLI::Option* force =
       command.add_flag("--force", options->force, "Let --out replace a file that is no map of the same frames");
