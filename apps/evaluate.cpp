@@ -238,8 +238,12 @@ void check(const EvaluateCommand& c) {
   need(c.reference_readings.empty() || is_map, "--reference-readings", "a map (.vdb)");
   need(!c.class_images || (is_map && !c.reference_labels.empty()), "--class-images",
        "a map (.vdb) and --reference-labels");
+  need(c.intrinsics->count() == 0 || of_sequence || !c.trajectory.empty(), "--intrinsics",
+       "--trajectory or --reference-labels");
   if (!problems.empty()) throw ConfigError(problems);
-  require_depth_range(c.cameras);
+  require_ending(c.reliability, ".svg");
+  // A map may bring a range of its own.
+  if (!is_map || (c.min_depth->count() > 0 && c.max_depth->count() > 0)) require_depth_range(c.cameras);
 }
 
 /// The range of depth that all frames of the map were fused with, where none was given.
@@ -312,7 +316,6 @@ int evaluate(EvaluateCommand& command) {
   if (!command.reliability.empty()) {
     if (!calibration || calibration->count() == 0)
       throw ConfigError(describe_mismatch("--reliability", "class probabilities", "a map with classes", "none"));
-    require_ending(command.reliability, ".svg");
     write_plot_svg(command.reliability, reliability_plots(*calibration), 2);
     json["reliability"] = command.reliability;
   }

@@ -50,8 +50,8 @@ void check(const ExportOptions& o) {
                                          nlohmann::json(o.box_m).dump()));
   // A whole map may be written anew in its place (--compact); a part, or a picture of it, would be all that is left.
   const bool whole = o.class_name.empty() && o.box_m.empty() && o.segment_at.empty() && !o.half && o.grids.empty();
-  std::map<fs::path, std::string> uses;
-  if (!whole || o.vdb.empty()) uses[fs::weakly_canonical(o.map)] = "the map that is read";
+  std::map<fs::path, std::string> uses = {{fs::weakly_canonical(o.map), "the map that is read"}};
+  if (whole && !o.vdb.empty() && fs::weakly_canonical(o.vdb) == fs::weakly_canonical(o.map)) uses.clear();
   for (const auto& [option, file] :
        {std::pair("--vdb", o.vdb), {"--mesh", o.mesh}, {"--points", o.points}, {"--html", o.html}})
     if (!file.empty())

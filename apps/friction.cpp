@@ -8,6 +8,7 @@
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
+#include "apps/output_files.h"
 #include "apps/run_settings.h"
 #include "apps/touch_options.h"
 #include "io/files/atomic_file.h"
@@ -25,6 +26,8 @@ struct FrictionOptions : CommonOptions {
 };
 
 int run_friction(const FrictionOptions& options) {
+  require_ending(options.plot, ".svg");
+  require_ending(options.touch, ".csv");
   FrictionSettings settings = options.settings;
   std::string normal_from = "assumed: the z axis";
   double normal_sd_rad = 0;

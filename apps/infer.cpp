@@ -11,6 +11,7 @@
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
+#include "apps/output_files.h"
 #include "core/error.h"
 #include "core/simd.h"
 #include "io/files/atomic_file.h"
@@ -49,6 +50,8 @@ int run_fit(const InferOptions& options) {
 }
 
 int run_infer(const InferOptions& options) {
+  require_ending(options.plot, ".svg");
+  require_ending(options.properties_out, ".yaml");
   if (!options.simd.empty()) choose_simd(options.simd, "--simd");
   if (!options.fit_priors.empty()) return run_fit(options);
   std::ios::sync_with_stdio(false);

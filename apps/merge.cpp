@@ -1,5 +1,9 @@
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -28,11 +32,18 @@ struct Options {
   bool overwrite = false;
 };
 
-/// The cap that was given, else the one that all maps were made with, else `usual`.
-float cap(const std::optional<float>& given, const std::vector<Map>& maps, const char* key, const char* what,
-          const char* option, float usual) {
+bool has_evidence(const Map& map) {
+  return std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
+                     [](const Block& block) { return !block.evidence.empty() || block.even_evidence != nullptr; });
+}
+
+/// The cap that was given, else the one that all maps were made with which hold what it caps, else `usual`.
+float cap(const std::optional<float>& given, const std::vector<Map>& maps, const std::function<bool(const Map&)>& holds,
+          const char* key, const char* what, const char* option, float usual) {
   if (given) return *given;
-  const std::set<double> caps = numbers_of_runs(maps, key);
+  std::set<double> caps;
+  for (const Map& map : maps)
+    if (holds(map)) caps.merge(numbers_of_runs({&map, 1}, key));
   if (caps.size() > 1)
     throw ConfigError(describe_mismatch("merge", what, std::string("the same in all maps, or ") + option,
                                         std::to_string(*caps.begin()) + " and " + std::to_string(*caps.rbegin())));
@@ -51,10 +62,13 @@ int run(const Options& options) {
   for (const std::string& path : options.maps) pointers.push_back(&maps.emplace_back(load_map(path)));
   const auto loaded = Clock::now();
   MergeOptions merging = options.merge;
-  merging.max_weight =
-      cap(options.max_weight, maps, "max_weight", "cap of weights", "--max-weight", merging.max_weight);
-  merging.max_evidence =
-      cap(options.max_evidence, maps, "label_cap", "cap of class evidence", "--label-cap", merging.max_evidence);
+  merging.max_weight = cap(
+      options.max_weight, maps, [](const Map&) { return true; }, "max_weight", "cap of weights", "--max-weight",
+      merging.max_weight);
+  merging.max_evidence = cap(options.max_evidence, maps, has_evidence, "label_cap", "cap of class evidence",
+                             "--label-cap", merging.max_evidence);
+  if (maps.size() > 1 && any_run_with(maps, "carve"))
+    spdlog::warn("maps made with --carve: what one of them saw free does not erase what only another holds");
   const Map result = merge(pointers, merging);
   const MapWriting writing(options.out);
   require_nothing_lost(options.out, result, true, options.overwrite);

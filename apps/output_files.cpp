@@ -84,7 +84,7 @@ void require_nothing_lost(const fs::path& file, const Map& replacement, bool tou
 
 void require_ending(const fs::path& file, const std::string& ending) {
   if (file.extension() != ending && fs::is_regular_file(file))
-    throw ConfigError(describe_mismatch(file.string(), "picture", "a name that ends with " + ending,
+    throw ConfigError(describe_mismatch(file.string(), "output exists", "a name that ends with " + ending,
                                         "another file, which would be replaced"));
 }
 

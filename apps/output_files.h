@@ -23,7 +23,8 @@ void require_no_file(const std::filesystem::path& file, bool overwrite);
 /// holds more, unless `overwrite`.
 void require_nothing_lost(const std::filesystem::path& file, const Map& replacement, bool touches_too, bool overwrite);
 
-/// For pictures, which may be replaced: throws ConfigError where the file exists and its name does not end so.
+/// For pictures and tables, which may be replaced: throws ConfigError where the file exists and its name does not end
+/// so.
 void require_ending(const std::filesystem::path& file, const std::string& ending);
 
 /// Warns where the coordinates of a mesh are so large that 32-bit floats lose more than a millimetre.

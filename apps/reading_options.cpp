@@ -1,7 +1,6 @@
 #include "apps/reading_options.h"
 
 #include <cmath>
-#include <functional>
 
 #include "apps/command.h"
 #include "core/error.h"

@@ -26,6 +26,15 @@ std::set<double> numbers_of_runs(std::span<const Map> maps, const std::string& k
   return numbers;
 }
 
+bool any_run_with(std::span<const Map> maps, const std::string& flag) {
+  return std::any_of(maps.begin(), maps.end(), [&](const Map& map) {
+    return std::any_of(map.frames.runs.begin(), map.frames.runs.end(), [&](const FusedFrames& run) {
+      const nlohmann::json settings = settings_of(run);
+      return settings.contains(flag) && settings[flag] == true;
+    });
+  });
+}
+
 double least_observed_weight(const Map& map) {
   const bool by_depth = std::any_of(map.frames.runs.begin(), map.frames.runs.end(), [](const FusedFrames& run) {
     const nlohmann::json settings = settings_of(run);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -160,18 +161,24 @@ int list_touches(const TouchOptions& options) {
   return kDone;
 }
 
-/// How many of these touches the journal holds twice: the same reading at the same place and time.
+/// How many of these touches, which are the journal's newest, repeat one that it had before: the same reading at the
+/// same place and time.
 size_t repeated(const Map& map, const std::vector<TouchEffect>& effects) {
   const auto same = [](const TouchRequest& a, const TouchRequest& b) {
     return a.stamp_s == b.stamp_s && a.point_m == b.point_m && a.property == b.property && a.value == b.value &&
            a.sigma == b.sigma;
   };
-  return size_t(std::count_if(effects.begin(), effects.end(), [&](const TouchEffect& effect) {
+  std::set<uint64_t> still_to_come;
+  for (const TouchEffect& effect : effects) still_to_come.insert(effect.id);
+  size_t count = 0;
+  for (const TouchEffect& effect : effects) {
     const TouchRequest& request = map.touches.find(effect.id)->request;
-    return std::any_of(map.touches.touches.begin(), map.touches.touches.end(), [&](const Touch& other) {
-      return other.id != effect.id && !other.undone && same(other.request, request);
+    count += std::any_of(map.touches.touches.begin(), map.touches.touches.end(), [&](const Touch& other) {
+      return !still_to_come.contains(other.id) && !other.undone && same(other.request, request);
     });
-  }));
+    still_to_come.erase(effect.id);
+  }
+  return count;
 }
 
 TouchRequest request_of(const TouchOptions& options, const Map& map) {
@@ -238,8 +245,8 @@ int run_touch(const TouchOptions& options) {
   if (!options.dry_run && !options.out.empty()) require_nothing_lost(options.out, map, false, options.force);
   out["map_hash"] = options.dry_run ? map_hash(map) : save_map(map, out_file);
   if (const size_t twice = repeated(map, effects); twice > 0)
-    spdlog::warn("{} of {} touches repeat one that counts already (reading, place and time): they count twice", twice,
-                 effects.size());
+    spdlog::warn("{} of {} touches repeat one that counts already (reading, place and time): they {} twice", twice,
+                 effects.size(), options.dry_run ? "would count" : "count");
   // Only what is done is said to be.
   if (options.json) {
     if (!options.at.empty()) out.update(effect_json(map, effects.front(), request.region));

@@ -118,7 +118,14 @@ Finding check_missing(const SequenceListing& listing) {
   } else if (finding.faulty) {
     finding.belief = "frames cannot be used for the reasons counted";
   }
-  if (partnerless && listing.stamped)
+  // What the layout found out about stamps that do not meet says more than counts do.
+  const auto of_stamps = std::find_if(listing.notes.begin(), listing.notes.end(), [](const std::string& note) {
+    return note.find("--stamp-offset") != std::string::npos;
+  });
+  if (many_poses_missing && of_stamps != listing.notes.end()) {
+    finding.evidence += "; " + *of_stamps;
+    finding.remedy = "bring the stamps of poses and depth images together: --stamp-offset, or --max-dt";
+  } else if (partnerless && listing.stamped)
     finding.remedy =
         "--max-dt with a larger difference where colour lies farther from depth; --no-color where there is less of it";
   else if (many_poses_missing && frames.front().depth.codec == ImageSource::Codec::scan)

@@ -145,19 +145,43 @@ std::string text(double x) {
   return buffer;
 }
 
-/// Forces along the normal and across it, the first turned so that pressing counts.
+/// Forces along the normal and across it, the first turned so that the strongest presses.
 void project(const std::vector<Eigen::Vector3d>& force, const Eigen::Vector3d& normal, FrictionReading& out) {
   out.normal_n.clear();
   out.tangential_n.clear();
-  double pressed = 0;
   for (const Eigen::Vector3d& f : force) {
     out.normal_n.push_back(f.dot(normal));
     out.tangential_n.push_back((f - f.dot(normal) * normal).norm());
-    pressed += out.normal_n.back();
   }
   // Sensors differ in whether they report the force on the surface or on the tool.
-  if (pressed < 0)
+  const auto [least, most] = std::minmax_element(out.normal_n.begin(), out.normal_n.end());
+  if (-*least > *most)
     for (double& f : out.normal_n) f = -f;
+}
+
+/// Force of a log's first or last `samples`, whichever is the smaller along the normal, where it is steady there within
+/// `steady_n` and less than half of the strongest: what the sensor reads before or after the contact, its tool's weight
+/// perhaps, which may well exceed the normal force of a contact.
+std::optional<Eigen::Vector3d> resting_force(const std::vector<Eigen::Vector3d>& force, const Eigen::Vector3d& normal,
+                                             size_t samples, double steady_n) {
+  if (2 * samples > force.size()) return std::nullopt;
+  double strongest = 0;
+  for (const Eigen::Vector3d& f : force) strongest = std::max(strongest, std::abs(f.dot(normal)));
+  std::optional<Eigen::Vector3d> least;
+  for (const size_t first : {size_t(0), force.size() - samples}) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (size_t i = first; i < first + samples; ++i) {
+      sum += force[i];
+      low = std::min(low, force[i].dot(normal));
+      high = std::max(high, force[i].dot(normal));
+    }
+    const Eigen::Vector3d mean = sum / double(samples);
+    if (high - low < steady_n && std::abs(mean.dot(normal)) < 0.5 * strongest &&
+        (!least || std::abs(mean.dot(normal)) < std::abs(least->dot(normal))))
+      least = mean;
+  }
+  return least;
 }
 
 /// The longest contact. Throws FormatError where there is none.
@@ -229,7 +253,7 @@ double trend(const std::vector<double>& values, size_t begin, size_t end) {
   return products / squares * (n - 1);
 }
 
-/// Samples [begin, end) of steady sliding, its ends left out, and the level it keeps.
+/// Samples [begin, end) of steady sliding, its ends left out.
 struct Slide {
   size_t begin = 0, end = 0;
 };
@@ -264,8 +288,11 @@ Slide slide_of(const FrictionReading& reading, size_t firm_begin, size_t firm_en
   const size_t margin = std::min((slide.end - slide.begin) / 8, smear);
   slide.begin += margin;
   slide.end -= margin;
-  if (!long_enough() || 20 * (slide.end - slide.begin) < firm_end - firm_begin)
-    none("at most " + std::to_string(slide.end - slide.begin) + " of " + std::to_string(firm_end - firm_begin));
+  if (!long_enough()) none("none");
+  // Any ramp passes through the band somewhere.
+  if (20 * (slide.end - slide.begin) < firm_end - firm_begin)
+    none("a twentieth of the contact's " + std::to_string(firm_end - firm_begin) + " samples or less, " +
+         std::to_string(slide.end - slide.begin));
   if (const double change = std::abs(trend(ratio, slide.begin, slide.end)); change > within)
     none("F_t/F_n that changes by " + text(change) + " about " + text(level) + ": loaded, but not sliding");
   double tangential = 0;
@@ -304,13 +331,18 @@ FrictionReading friction_reading(const ForceLog& log, const FrictionSettings& se
   }
 
   FrictionReading out;
+  const auto smear = size_t(std::ceil(0.5 * rate_hz / settings.cutoff_hz));
+  const auto take_off = [&](const Eigen::Vector3d& offset_n) {
+    out.offset_n += offset_n;
+    for (Eigen::Vector3d& f : force) f -= offset_n;
+  };
+  if (const auto resting = resting_force(force, normal, std::max(kFewestSamples, 2 * smear), settings.contact_n))
+    take_off(*resting);
   project(force, normal, out);
   find_contact_in(out, settings.contact_n);
-  const auto smear = size_t(std::ceil(0.5 * rate_hz / settings.cutoff_hz));
   const std::optional<Idle> idle = idle_of(force, normal, out, settings.contact_n, 2 * smear);
   if (idle) {
-    out.offset_n = idle->offset_n;
-    for (Eigen::Vector3d& f : force) f -= out.offset_n;
+    take_off(idle->offset_n);
     project(force, normal, out);
     find_contact_in(out, settings.contact_n);
   }

@@ -46,10 +46,10 @@ std::vector<double> low_pass_zero_phase(const std::vector<double>& samples, doub
 /// Low-pass; what the sensor reads without contact taken off (where the log shows it); normal and tangential force by
 /// projection on the normal; longest contact with F_n >= contact_n, of which the ratio counts where F_n is at least
 /// half its median; kinetic plateau (the longest run within a tenth, or three robust deviations up to a quarter, of the
-/// ratio that most of the loaded contact keeps); static peak (the highest ratio before it). Throws ConfigError for a
-/// normal or setting that is no number in range, and FormatError where there is no contact, no normal force, or no
-/// sliding: no run, one that rises all along as a load on a foot that sticks does, or a tangential force that the
-/// sensor's noise explains.
+/// ratio that most of the loaded contact keeps, at least a twentieth of the contact long); static peak (the highest
+/// ratio before it). Throws ConfigError for a normal or setting that is no number in range, and FormatError where there
+/// is no contact, no normal force, or no sliding: no run, one that rises all along as a load on a foot that sticks
+/// does, or a tangential force that the sensor's noise explains.
 FrictionReading friction_reading(const ForceLog& log, const FrictionSettings& settings);
 
 /// Forces and their ratio over time with contact, peak and plateau marked.

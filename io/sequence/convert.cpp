@@ -103,7 +103,7 @@ public:
     if (info_.voxel_size_m > 0 && !generic) result.left_out.emplace_back("the voxel size that suits the sensor");
     if (info_.max_depth_m > 0 && !generic) result.left_out.emplace_back("the depth that the sensor reaches to");
     // A scale that was asked for is no surprise.
-    if (options.depth_scale == 0 && info_.depth_scale > depth_scale_)
+    if (options.depth_scale == 0 && (info_.depth_scale > depth_scale_ || info_.depth_scale < 100))
       result.left_out.push_back("depth steps finer than " + short_number(1000 / depth_scale_) + " mm");
   }
 

@@ -22,22 +22,27 @@ int cell_px(const PinholeCamera& camera, const PinholeCamera& depth_camera) {
 /// The nearest depth seen in each cell of an image: what lies clearly behind it shows another surface there.
 class NearestDepth {
 public:
-  NearestDepth(int width, int height, int cell)
+  /// `baseline_m`: between the two cameras.
+  NearestDepth(int width, int height, int cell, const PinholeCamera& camera, double baseline_m)
       : cell_(cell),
         columns_((width + cell - 1) / cell),
+        // A surface seen at 80 degrees changes by so much of its depth within a cell.
+        behind_(std::max(1.05f, float(1 + 5.67 * cell / std::min(camera.fx, camera.fy)))),
+        baseline_px_(float(baseline_m * std::max(camera.fx, camera.fy))),
         z_(size_t(columns_) * size_t((height + cell - 1) / cell), std::numeric_limits<float>::infinity()) {}
 
   void add(int x, int y, float z) { at(x, y) = std::min(at(x, y), z); }
   bool hides(int x, int y, float z) {
-    // A surface seen at 80 degrees changes by 2 % of its depth within a cell.
-    constexpr float kBehind = 1.05f;
-    return z > kBehind * at(x, y);
+    const float near = at(x, y);
+    // Two surfaces that both cameras see side by side, within half a pixel, hide nothing from each other.
+    return z > behind_ * near && baseline_px_ * (1 / near - 1 / z) > 0.5f;
   }
 
 private:
   float& at(int x, int y) { return z_[size_t(y / cell_) * size_t(columns_) + size_t(x / cell_)]; }
 
   int cell_, columns_;
+  float behind_, baseline_px_;
   std::vector<float> z_;
 };
 
@@ -71,7 +76,7 @@ Image<Pixel> registered_to_depth(const Image<Pixel>& image, const PinholeCamera&
     float z = 0;
   };
   Image<Seen> seen(width, height);
-  NearestDepth nearest(image.width(), image.height(), cell_px(camera, depth_camera));
+  NearestDepth nearest(image.width(), image.height(), cell_px(camera, depth_camera), camera, t.norm());
   for (int v = 0; v < height; ++v)
     for (int u = 0; u < width; ++u) {
       const double z = same_place ? 1.0 : double(depth_m(u, v));

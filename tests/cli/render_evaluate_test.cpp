@@ -241,6 +241,12 @@ TEST_CASE("what a picture would replace must be a picture, and exports keep apar
   const CommandResult result = run_feltmap("export " + map + " --mesh " + mesh + " --points " + same);
   CHECK(result.exit_code == 3);
   CHECK_THAT(result.err, Contains("another one than --mesh"));
+  const std::string other = (folder.path() / "other.vdb").string(),
+                    log = (source_dir() / "data" / "friction_log.csv").string();
+  CHECK(run_feltmap("export " + map + " --vdb " + other + " --html " + map + " --force").exit_code == 3);
+  CHECK(run_feltmap("friction " + log + " --plot " + map).exit_code == 3);
+  CHECK(run_feltmap("friction " + log + " --at 0,0,0 --touch " + map).exit_code == 3);
+  CHECK(run_feltmap("infer --plot " + map).exit_code == 3);
   CHECK(file_text(map) == before);
   CHECK_FALSE(std::filesystem::exists(mesh));
 }

@@ -299,6 +299,10 @@ TEST_CASE("touches that the map has already are applied, with a warning that the
   CHECK(again.exit_code == 0);
   CHECK_THAT(again.err, Catch::Contains("2 of 2 touches repeat"));
   CHECK(load_map(map).touches.touches.size() == 4);
+  // Within a file the first of equal rows repeats nothing; a dry run counts nothing.
+  write_file_atomically(csv, "stamp,x,y,z,property,value\n3,-0.2,0,0,friction,0.17\n3,-0.2,0,0,friction,0.17\n");
+  CHECK_THAT(run_feltmap("touch " + map + " --dry-run --file " + csv).err,
+             Catch::Contains("1 of 2 touches repeat") && Catch::Contains("would count twice"));
 }
 
 }  // namespace felt::test

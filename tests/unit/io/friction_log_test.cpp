@@ -160,6 +160,26 @@ TEST_CASE("what a sensor reads without contact is taken off") {
   }
 }
 
+TEST_CASE("a tool's weight along the normal is taken off, however it compares with a contact") {
+  for (const double weight_n : {0.5, 1.1, 3.0, -2.0, -3.0}) {
+    ForceLog log = pressed_log(4, 2, 0.05, 0.5, [](double t) { return t < 1 ? 0.6 * t : 0.5; });
+    for (Eigen::Vector3d& f : log.force_n) f.z() += weight_n;
+    const FrictionReading reading = friction_reading(log, {});
+    INFO("weight " << weight_n);
+    CHECK(reading.kinetic_mean == Approx(0.5).epsilon(0.01));
+    CHECK(reading.static_peak == Approx(0.59).margin(0.02));
+    CHECK(reading.offset_n.z() == Approx(weight_n).margin(0.02));
+    CHECK(log.time_s[reading.contact_begin] == Approx(2).margin(0.05));
+    CHECK(log.time_s[reading.slide_begin] > 3);
+  }
+  // A log that starts and ends in contact has nothing to take off.
+  ForceLog pressed = pressed_log(6, 0, 0.05, 0, [](double t) { return t < 2 ? 0.25 * t : 0.4; });
+  pressed.time_s = {pressed.time_s.begin() + 100, pressed.time_s.end() - 100};
+  pressed.force_n = {pressed.force_n.begin() + 100, pressed.force_n.end() - 100};
+  CHECK(friction_reading(pressed, {}).offset_n.norm() == 0);
+  CHECK(friction_reading(pressed, {}).kinetic_mean == Approx(0.4).epsilon(0.01));
+}
+
 TEST_CASE("touch-down, lift-off and long waiting leave the static peak alone") {
   for (const double mu : {0.05, 0.3}) {
     const FrictionReading reading =

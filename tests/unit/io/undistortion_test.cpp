@@ -177,3 +177,15 @@ TEST_CASE("what the colour camera sees another surface before takes no colour") 
       CHECK(found == (plate ? 9 : hidden ? 0 : 7));
   }
 }
+
+TEST_CASE("a colour camera beside the depth camera by next to nothing sees all that it sees") {
+  const PinholeCamera camera{100, 100, 49.5, 19.5, 100, 40};
+  DepthImage depth_m(100, 40, 3.0f);
+  for (int v = 0; v < 40; ++v)
+    for (int u = 50; u < 70; ++u) depth_m(u, v) = 1;
+  const Image<uint16_t> labels(100, 40, 7);
+  Eigen::Matrix4d T = Eigen::Matrix4d::Identity();
+  T(0, 3) = -0.002;
+  const Image<uint16_t> registered = registered_to_depth<uint16_t>(labels, camera, depth_m, camera, T, 0);
+  for (int u = 1; u < 100; ++u) CHECK(int(registered(u, 20)) == 7);
+}
