@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "io/sequence/camera_file.h"
 #include "io/sequence/layouts/file_names.h"
 
 namespace felt {
@@ -38,6 +39,13 @@ std::vector<FrameRecord> frame_records(const FrameFiles& files, const std::vecto
     frames.push_back(std::move(frame));
   }
   return frames;
+}
+
+void take_camera_file(const fs::path& file, const SequenceOptions& options, SequenceListing& listing) {
+  const CameraFile stated = read_camera_file(file);
+  if (!options.intrinsics) listing.intrinsics = stated.intrinsics;
+  listing.width = stated.width, listing.height = stated.height;
+  if (stated.depth_scale > 0) listing.depth_scale = stated.depth_scale;
 }
 
 }  // namespace felt

@@ -31,4 +31,8 @@ struct FrameFiles {
 /// One record for each number of a depth, colour or pose file or of `more_numbers`, ascending, stamped with its number.
 std::vector<FrameRecord> frame_records(const FrameFiles& files, const std::vector<int64_t>& more_numbers = {});
 
+/// Takes over what a camera file states: image size, depth scale, and the intrinsics where `options` give none. Throws
+/// as read_camera_file does.
+void take_camera_file(const std::filesystem::path& file, const SequenceOptions& options, SequenceListing& listing);
+
 }  // namespace felt

@@ -2,7 +2,6 @@
 
 #include "core/error.h"
 #include "io/files/text_input.h"
-#include "io/sequence/camera_file.h"
 #include "io/sequence/layouts.h"
 #include "io/sequence/layouts/file_names.h"
 #include "io/sequence/layouts/frame_files.h"
@@ -73,10 +72,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
                             std::to_string(pose_at.size()) + " poses in " + log.filename().string() +
                             ": they are taken to go together in order, from the first on");
   if (const fs::path camera = first_existing(path, kCameras); !camera.empty()) {
-    const CameraFile file = read_camera_file(camera);
-    if (!options.intrinsics) listing.intrinsics = file.intrinsics;
-    listing.width = file.width, listing.height = file.height;
-    if (file.depth_scale > 0) listing.depth_scale = file.depth_scale;
+    take_camera_file(camera, options, listing);
   } else if (!options.intrinsics) {
     listing.intrinsics = Intrinsics{525, 525, 319.5, 239.5};
     listing.notes.push_back("no intrinsic.json: Open3D's default camera (525, 525, 319.5, 239.5) is assumed");

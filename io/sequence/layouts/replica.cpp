@@ -1,7 +1,6 @@
 #include <numeric>
 
 #include "core/error.h"
-#include "io/sequence/camera_file.h"
 #include "io/sequence/layouts.h"
 #include "io/sequence/layouts/file_names.h"
 #include "io/sequence/layouts/frame_files.h"
@@ -42,10 +41,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
                               ? first_existing(path.parent_path(), {"cam_params.json"})
                               : path / "cam_params.json";
   if (!camera.empty()) {
-    const CameraFile file = read_camera_file(camera);
-    listing.intrinsics = file.intrinsics;
-    listing.width = file.width, listing.height = file.height;
-    if (file.depth_scale > 0) listing.depth_scale = file.depth_scale;
+    take_camera_file(camera, options, listing);
   } else if (!options.intrinsics) {
     listing.intrinsics = Intrinsics{600, 600, 599.5, 339.5};
     listing.notes.push_back("no cam_params.json: the camera of Replica (600, 600, 599.5, 339.5) is assumed");

@@ -5,9 +5,9 @@
 
 #include "core/error.h"
 #include "io/files/text_input.h"
-#include "io/sequence/camera_file.h"
 #include "io/sequence/layouts.h"
 #include "io/sequence/layouts/file_names.h"
+#include "io/sequence/layouts/frame_files.h"
 #include "io/sequence/trajectory_file.h"
 
 namespace felt {
@@ -156,10 +156,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
       first_existing(path, {"camera-intrinsics.txt", "intrinsics.txt", "camera.yaml", "calibration.txt"});
   // Only YAML can state more than the intrinsics that were given.
   if (!camera.empty() && (!options.intrinsics || camera.extension() == ".yaml")) {
-    const CameraFile file = read_camera_file(camera);
-    if (!options.intrinsics) listing.intrinsics = file.intrinsics;
-    listing.width = file.width, listing.height = file.height;
-    if (file.depth_scale > 0) listing.depth_scale = file.depth_scale;
+    take_camera_file(camera, options, listing);
   } else if (!options.intrinsics) {
     listing.intrinsics = Intrinsics{525, 525, 319.5, 239.5};
     listing.notes.push_back(
