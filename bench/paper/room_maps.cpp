@@ -173,10 +173,11 @@ void room_maps(const Options& options, Checks& checks) {
     for (size_t i = 0; i < better.size(); ++i) difference.push_back(better[i] - worse[i]);
     checks.better(what, mean_of(difference), options.quick ? 0 : interval(difference) / 1.96);
   };
-  compare("maps: ECE of vision only less that of ours touched once", all[kVision].ece, all[kOne].ece);
-  compare("maps: ECE of vision only less that of calibrated vision", all[kVision].ece, all[kCalibrated].ece);
+  compare("maps: ECE of vision only, counts, less that of ours touched once", all[kVision].ece, all[kOne].ece);
+  compare("maps: ECE of vision only, counts, less that of calibrated vision", all[kVision].ece, all[kCalibrated].ece);
   if (options.quick) return;  // too few touches to say
-  compare("maps: accuracy of ours touched once less that of vision only", all[kOne].accuracy, all[kVision].accuracy);
+  compare("maps: accuracy of ours touched once less that of vision only, counts", all[kOne].accuracy,
+          all[kVision].accuracy);
 }
 
 }  // namespace felt::paper
