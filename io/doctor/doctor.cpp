@@ -1,10 +1,7 @@
 #include "io/doctor/doctor.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 
-#include "core/error.h"
 #include "io/doctor/color_check.h"
 #include "io/doctor/encoding_check.h"
 #include "io/doctor/file_check.h"
@@ -13,16 +10,11 @@
 #include "io/doctor/proposal.h"
 #include "io/doctor/sample.h"
 #include "io/doctor/trajectory_check.h"
+#include "io/sequence/listed_sequence.h"
 #include "io/sequence/open_sequence.h"
 
 namespace felt {
 namespace fs = std::filesystem;
-
-std::string number_text(double value, const char* format) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
 
 bool Examination::faulty() const {
   return std::any_of(findings.begin(), findings.end(), [](const Finding& finding) { return finding.faulty; });
@@ -42,8 +34,26 @@ bool of_range_sensor(const SequenceListing& listing) {
 Examination begin(const SequenceListing& listing) {
   Examination examination;
   examination.layout = listing.layout;
-  examination.recorded_frames = int64_t(listing.frames.size());
+  examination.recorded_frames = examination.selected_frames = int64_t(listing.frames.size());
   return examination;
+}
+
+/// What became of the sampled frames when they were read, in the finding about what the files tell: images that cannot
+/// be decoded, or have another size, are named; a sequence of which no frame can be read is faulty whatever the reason.
+void add_skipped(const Sample& sample, Finding& finding) {
+  const bool none = sample.geometry.frames.empty();
+  int64_t broken = 0;
+  for (const auto& [reason, frames] : sample.skipped_frames) {
+    const bool of_image = reason.ends_with(" image") && !reason.starts_with("missing");
+    if (of_image) broken += int64_t(frames.size());
+    if (of_image || none) finding.evidence += "; " + reason + " in sampled frames " + frames_text(frames);
+  }
+  if (broken == 0 && !none) return;
+  if (!finding.faulty || none)
+    finding.belief = none ? "no sampled frame can be read"
+                          : std::to_string(broken) + " sampled frames have images that cannot be read";
+  finding.faulty = true;
+  if (finding.remedy.empty()) finding.remedy = "copy the recording again, or leave these frames out with --frames";
 }
 
 }  // namespace
@@ -51,8 +61,11 @@ Examination begin(const SequenceListing& listing) {
 Examination examine_sequence(const fs::path& path, const SequenceOptions& options) {
   SequenceListing listing = list_sequence(path, options);
   Examination examination = begin(listing);
+  select_frames(options.frames, listing);
+  examination.selected_frames = int64_t(listing.frames.size());
   if (auto finding = check_stated_camera(listing)) examination.findings.push_back(std::move(*finding));
-  append(examination.findings, check_files(listing));
+  examination.findings.push_back(check_frames(listing));
+  examination.findings.push_back(check_copies(listing, *plain_reader(path, options, listing, Images::depth)));
   if (of_range_sensor(listing)) return examination;
   append(examination.findings, check_depth_images(path, options, listing));
 
@@ -60,8 +73,9 @@ Examination examine_sequence(const fs::path& path, const SequenceOptions& option
   examination.sampled_frames = int64_t(sample.geometry.frames.size());
   examination.frame_pairs = int64_t(sample.geometry.pairs.size());
   examination.skipped = sample.skipped;
-  if (sample.geometry.frames.empty())
-    throw FormatError(describe_mismatch(path.string(), "frames", "some that can be read", "none"));
+  for (Finding& finding : examination.findings)
+    if (finding.topic == "frames") add_skipped(sample, finding);
+  if (sample.geometry.frames.empty()) return examination;
   const Reading best = best_reading(sample.geometry, true);
   if (sample.geometry.pairs.size() >= 2) {
     append(examination.findings, geometry_findings(sample.geometry, best, true));

@@ -18,7 +18,9 @@ struct MapProposal {
 
 struct Examination {
   std::string layout;
-  int64_t recorded_frames = 0, sampled_frames = 0, frame_pairs = 0;
+  int64_t recorded_frames = 0;
+  int64_t selected_frames = 0;  ///< of the recorded ones: all that was looked at is of these
+  int64_t sampled_frames = 0, frame_pairs = 0;
   std::map<std::string, int64_t> skipped;  ///< sampled frames that could not be read, by reason
   std::vector<Finding> findings;
   MapProposal proposal;
@@ -31,7 +33,8 @@ struct Examination {
 /// nothing at all can be read.
 Examination examine_sequence(const std::filesystem::path& path, const SequenceOptions& options = {});
 
-/// The part of it that takes a few frames only: what is faulty about conventions, depth and colour order.
+/// The part of it that takes a few frames only: what is faulty about conventions, depth and colour order. They are
+/// those of the whole recording, which tells more of them than the selected frames do.
 Examination examine_quickly(const std::filesystem::path& path, const SequenceOptions& options = {});
 
 }  // namespace felt

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/doctor/sample.h"
 #include "io/files/text_input.h"
 #include "io/images/image_decode.h"
@@ -78,8 +79,6 @@ double share_of_equal_low_bits(const std::vector<DepthImage>& depths, double sca
   return different == 0 ? 0 : double(equal) / double(different);
 }
 
-std::string percent(double share) { return number_text(100 * share, "%.2g") + " %"; }
-
 struct Size {
   int width = 0, height = 0;
   std::string text() const { return std::to_string(width) + " x " + std::to_string(height); }
@@ -100,11 +99,6 @@ Size depth_image_size(const SequenceListing& listing) {
     }
   }
   return {};
-}
-
-std::string intrinsics_option(const Intrinsics& k) {
-  return "--intrinsics " + number_text(k.fx, "%.5g") + "," + number_text(k.fy, "%.5g") + "," +
-         number_text(k.cx, "%.5g") + "," + number_text(k.cy, "%.5g");
 }
 
 }  // namespace
@@ -131,7 +125,7 @@ std::optional<Finding> check_stated_camera(SequenceListing& listing) {
       const double sx = double(image.width) / stated.width, sy = double(image.height) / stated.height;
       k = {k.fx * sx, k.fy * sy, (k.cx + 0.5) * sx - 0.5, (k.cy + 0.5) * sy - 0.5};
     }
-    finding.remedy = intrinsics_option(k);
+    finding.remedy = intrinsics_option(k.fx, k.fy, k.cx, k.cy);
     return finding;
   }
   if (fits(k)) return std::nullopt;
@@ -141,7 +135,8 @@ std::optional<Finding> check_stated_camera(SequenceListing& listing) {
   finding.evidence = "the principal point " + number_text(k.cx, "%.5g") + ", " + number_text(k.cy, "%.5g") +
                      " lies outside of " + image.text();
   k = exchanged;
-  finding.remedy = intrinsics_option(k);
+  listing.lacking_camera_file.clear();
+  finding.remedy = intrinsics_option(k.fx, k.fy, k.cx, k.cy);
   return finding;
 }
 
@@ -154,7 +149,7 @@ std::vector<Finding> check_depth_images(const std::filesystem::path& path, const
   Finding encoding{"depth-encoding", false, 0.95, "depth is stored as plain numbers", "", ""};
   if (listing.depth_encoding == DepthEncoding::rotated3)
     encoding.belief = "depth is stored with its bits rotated by three";
-  encoding.evidence = percent(as_read.across) + " of neighbouring pixels differ by more than a quarter";
+  encoding.evidence = percent_text(as_read.across) + " of neighbouring pixels differ by more than a quarter";
 
   SequenceListing other = listing;
   const bool rotated_now = listing.depth_encoding == DepthEncoding::rotated3;
@@ -174,10 +169,11 @@ std::vector<Finding> check_depth_images(const std::filesystem::path& path, const
     encoding.faulty = true;
     encoding.belief = rotated_now ? "depth is stored as plain numbers"
                                   : "the bits of depth are rotated by three (picking challenge, SUN RGB-D)";
-    if (runs_over) encoding.evidence += ", " + percent(as_read.wraps) + " from near 0 to near the largest number";
+    if (runs_over) encoding.evidence += ", " + percent_text(as_read.wraps) + " from near 0 to near the largest number";
     if (high_bits_below)
-      encoding.evidence += ", the three lowest bits of " + percent(low_bits) + " of different neighbours agree, and ";
-    encoding.evidence += (high_bits_below ? "" : ", but ") + percent(other_across) + " read so";
+      encoding.evidence +=
+          ", the three lowest bits of " + percent_text(low_bits) + " of different neighbours agree, and ";
+    encoding.evidence += (high_bits_below ? "" : ", but ") + percent_text(other_across) + " read so";
     encoding.remedy = rotated_now ? "--depth-encoding plain" : "--depth-encoding rotated3 --depth-scale 10000";
     if (rotated_now != (listing.depth_scale == 10000)) other.depth_scale = rotated_now ? 1000 : 10000;
     listing = other;
@@ -187,8 +183,8 @@ std::vector<Finding> check_depth_images(const std::filesystem::path& path, const
     Finding size{"image-size", true,
                  0.9,          "rows of the depth images have another length: width and height are exchanged",
                  "",           ""};
-    size.evidence = percent(as_read.down) + " of pixels differ by more than a quarter from the one below, but " +
-                    percent(swapped.down) + " in rows of " + std::to_string(now.front().height());
+    size.evidence = percent_text(as_read.down) + " of pixels differ by more than a quarter from the one below, but " +
+                    percent_text(swapped.down) + " in rows of " + std::to_string(now.front().height());
     size.remedy = "write the images again with the right width";
     return {encoding, size};
   }

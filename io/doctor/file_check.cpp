@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <system_error>
+#include <variant>
 
 #include "io/sequence/recorded_pose.h"
 
@@ -11,28 +13,14 @@ namespace felt {
 namespace fs = std::filesystem;
 namespace {
 
-/// "3, 4, 9 and 12 more"
-std::string listed(const std::vector<int64_t>& numbers) {
-  constexpr size_t kNamed = 6;
-  std::string text;
-  for (size_t i = 0; i < std::min(kNamed, numbers.size()); ++i)
-    text += (i == 0 ? "" : ", ") + std::to_string(numbers[i]);
-  if (numbers.size() > kNamed) text += " and " + std::to_string(numbers.size() - kNamed) + " more";
-  return text;
-}
-
-uint64_t bytes_of(const ImageSource& source) {
-  if (source.empty() || source.bytes > 0) return source.bytes;
-  std::error_code fault;
-  const uintmax_t size = fs::file_size(source.path, fault);
-  return fault ? 0 : uint64_t(size);
-}
+/// As layouts say it of frames whose colour image they look for by its stamp.
+constexpr const char* kMissingColor = "missing colour image";
 
 /// True where both sources hold the same bytes.
 bool same_bytes(const ImageSource& a, const ImageSource& b) {
   if (a.face != b.face) return false;  // the four views of a scan come from one file
-  const uint64_t size = bytes_of(a);
-  if (size == 0 || size != bytes_of(b)) return false;
+  const uint64_t size = stored_bytes(a);
+  if (size == 0 || size != stored_bytes(b)) return false;
   std::ifstream file_a(a.path, std::ios::binary), file_b(b.path, std::ios::binary);
   file_a.seekg(std::streamoff(a.offset));
   file_b.seekg(std::streamoff(b.offset));
@@ -44,20 +32,6 @@ bool same_bytes(const ImageSource& a, const ImageSource& b) {
     left -= uint64_t(count);
   }
   return true;
-}
-
-Finding check_copies(const std::vector<FrameRecord>& frames) {
-  std::vector<int64_t> copies;
-  for (size_t i = 1; i < frames.size(); ++i)
-    if (same_bytes(frames[i - 1].depth, frames[i].depth) || same_bytes(frames[i - 1].color, frames[i].color))
-      copies.push_back(frames[i].index);
-  Finding finding{"duplicates", !copies.empty(), 0.99, "no image is a copy of the one before", "", ""};
-  finding.evidence = "files of " + std::to_string(frames.size()) + " frames compared";
-  if (copies.empty()) return finding;
-  finding.belief = std::to_string(copies.size()) + " frames repeat the image of the frame before";
-  finding.evidence = "equal bytes in frames " + listed(copies);
-  finding.remedy = "leave them out with --frames, or record again";
-  return finding;
 }
 
 /// Numbers that a regular numbering would have and this one lacks; empty where the numbering is not regular.
@@ -77,7 +51,23 @@ std::vector<int64_t> numbers_missing(const std::vector<FrameRecord>& frames) {
   return missing;
 }
 
-Finding check_missing(const SequenceListing& listing) {
+/// Of a recording that lacks no depth image, what becomes of its frames: `reasons` as counted, not empty.
+std::string skipped_text(const std::map<std::string, int64_t>& reasons, size_t frames) {
+  int64_t skipped = 0, colorless = 0;
+  for (const auto& [reason, count] : reasons) {
+    skipped += count;
+    if (reason == kMissingColor) colorless = count;
+  }
+  std::string text = "every depth image is there; " + std::to_string(skipped) + " of " + std::to_string(frames) +
+                     " frames are skipped";
+  if (colorless == 0) return text;
+  if (colorless < skipped) text += ", " + std::to_string(colorless) + " of them";
+  return text + " as they have no colour of their own (--no-color uses them)";
+}
+
+}  // namespace
+
+Finding check_frames(const SequenceListing& listing) {
   const std::vector<FrameRecord>& frames = listing.frames;
   std::error_code fault;
   std::map<std::string, int64_t> reasons;
@@ -98,7 +88,7 @@ Finding check_missing(const SequenceListing& listing) {
   // Lost tracking and images without a partner belong to recording; more than that does not.
   const bool many_poses_missing = share("missing pose") > 0.15 || share("non-finite pose") > 0.3;
   const bool disordered = share("stamp out of order") > 0, unreadable = share("unreadable pose") > 0,
-             not_rigid = share("non-rigid pose") > 0, partnerless = share("missing colour image") > 0.3;
+             not_rigid = share("non-rigid pose") > 0, partnerless = share(kMissingColor) > 0.3;
   Finding finding{"frames",
                   !without_depth.empty() || !gaps.empty() || many_poses_missing || disordered || unreadable ||
                       not_rigid || partnerless,
@@ -111,12 +101,14 @@ Finding check_missing(const SequenceListing& listing) {
   for (const auto& [reason, count] : reasons) finding.evidence += ", " + std::to_string(count) + " " + reason;
   if (!without_depth.empty()) {
     finding.belief = std::to_string(without_depth.size()) + " frames lack their depth image";
-    finding.evidence += "; frames " + listed(without_depth);
+    finding.evidence += "; frames " + frames_text(without_depth);
   } else if (!gaps.empty()) {
     finding.belief = std::to_string(gaps.size()) + " frames are missing from an otherwise regular numbering";
-    finding.evidence += "; numbers " + listed(gaps);
+    finding.evidence += "; numbers " + frames_text(gaps);
   } else if (finding.faulty) {
     finding.belief = "frames cannot be used for the reasons counted";
+  } else if (!reasons.empty()) {
+    finding.belief = skipped_text(reasons, frames.size());
   }
   // What the layout found out about stamps that do not meet says more than counts do.
   const auto of_stamps = std::find_if(listing.notes.begin(), listing.notes.end(), [](const std::string& note) {
@@ -136,10 +128,44 @@ Finding check_missing(const SequenceListing& listing) {
   return finding;
 }
 
+namespace {
+
+/// Views of nothing and of a wall straight ahead, which repeat themselves while the camera moves.
+bool all_alike(const DepthImage& depth_m) {
+  float least = std::numeric_limits<float>::infinity(), most = 0;
+  for (const float z : depth_m)
+    if (z > 0) least = std::min(least, z), most = std::max(most, z);
+  return most <= least * 1.0001f;
+}
+
+/// Whether a frame's images are those of the frame before, and no camera that moves would see that.
+bool repeats(const FrameRecord& before, const FrameRecord& frame, int64_t position, const SequenceReader& depth) {
+  const bool same_depth = same_bytes(before.depth, frame.depth), same_color = same_bytes(before.color, frame.color);
+  if (!same_depth && !same_color) return false;
+  const ReadResult result = depth.read(position);
+  const auto* decoded = std::get_if<Frame>(&result);
+  if (decoded == nullptr) return std::get<SkippedFrame>(result).reason != "depth all zero";
+  if (same_depth && (same_color || frame.color.empty())) return !all_alike(decoded->depth_m);
+  // One of the two alone: plain surfaces without noise, which take few bytes, look alike from many places.
+  constexpr double kPlainBytesPerPixel = 0.05;
+  return double(stored_bytes(same_depth ? frame.depth : frame.color)) >=
+         kPlainBytesPerPixel * double(decoded->depth_m.width()) * double(decoded->depth_m.height());
+}
+
 }  // namespace
 
-std::vector<Finding> check_files(const SequenceListing& listing) {
-  return {check_missing(listing), check_copies(listing.frames)};
+Finding check_copies(const SequenceListing& listing, const SequenceReader& depth) {
+  const std::vector<FrameRecord>& frames = listing.frames;
+  std::vector<int64_t> copies;
+  for (size_t i = 1; i < frames.size(); ++i)
+    if (repeats(frames[i - 1], frames[i], int64_t(i), depth)) copies.push_back(frames[i].index);
+  Finding finding{"duplicates", !copies.empty(), 0.99, "no image is a copy of the one before", "", ""};
+  finding.evidence = "files of " + std::to_string(frames.size()) + " frames compared";
+  if (copies.empty()) return finding;
+  finding.belief = std::to_string(copies.size()) + " frames repeat the image of the frame before";
+  finding.evidence = "equal bytes in frames " + frames_text(copies);
+  finding.remedy = "leave them out with --frames, or record again";
+  return finding;
 }
 
 }  // namespace felt

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,13 @@ struct Finding {
   std::string remedy;     ///< the option that mends it, or what to do; empty where nothing is wrong
 };
 
-/// A number as a person would write it: "%.3g" unless another format is given.
-std::string number_text(double value, const char* format = "%.3g");
+/// A share of 1 in per cent: "0.26 %", "4.1 %", "100 %".
+std::string percent_text(double share);
+
+/// Frame numbers: "3, 4, 9 and 12 more".
+std::string frames_text(const std::vector<int64_t>& numbers);
+
+/// The option that states a camera: "--intrinsics fx,fy,cx,cy", pixels.
+std::string intrinsics_option(double fx, double fy, double cx, double cy);
 
 }  // namespace felt

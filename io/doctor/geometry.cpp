@@ -211,6 +211,14 @@ bool shows_scale(const GeometrySample& sample, const Reading& reading) {
   return convincing(compare(scores(turning), scores(reading)), kLeastParallax);
 }
 
+/// Surfaces that meet as well as rendered ones do, stored in steps and looked up in the nearest pixel: what another
+/// reading gains there is rounding.
+bool leaves_nothing_to_explain(const Agreement& agreement, const GeometrySample& sample) {
+  const double half_step = 0.5 / (sample.depth_scale * std::max(1e-9, sample.median_depth_m));
+  return agreement.pairs > 0 && agreement.meets >= kNearlyAll &&
+         agreement.residual <= std::max(half_step, kNearestPixel);
+}
+
 }  // namespace
 
 Reading best_reading(const GeometrySample& sample, bool thorough) {
@@ -221,8 +229,12 @@ Reading best_reading(const GeometrySample& sample, bool thorough) {
   const auto scores = [&](const Reading& reading) {
     return cross_project(sample.frames, sample.pairs, sample.trajectory, sample.camera, reading);
   };
+  const Agreement now = agreement_of(scores(sample.now));
+  if (leaves_nothing_to_explain(now, sample)) return sample.now;
   const Reading best = search(false);
   const std::vector<PairScore> best_scores = scores(best);
+  // Where little is in view a search may end where hardly anything meets.
+  if (agreement_of(best_scores).meets < kLeastMeeting && now.meets >= kLeastMeeting) return sample.now;
   // Few sequences store quaternions: none is asked about them that fits with its poses as they are.
   constexpr double kFits = 0.5;
   if (best.convention == sample.now.convention && agreement_of(best_scores).meets >= kFits) return best;

@@ -34,6 +34,15 @@ Agreement agreement_of(const std::vector<PairScore>& scores);
 /// do by chance.
 inline constexpr double kLeastMeeting = 0.35;
 
+/// Share of points in view that meet under a reading that fits without exception.
+inline constexpr double kNearlyAll = 0.9;
+
+/// Distance of surfaces that are exact, looked up in the nearest pixel: share of the depth.
+inline constexpr double kNearestPixel = 1e-3;
+
+/// So few frames fit a trajectory by any delay, and may show different sides of everything.
+inline constexpr size_t kFewFrames = 8;
+
 /// `other` against `base`, pair by pair.
 struct Comparison {
   double gain = 0;  ///< mean difference of scores

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <map>
 
+#include "core/text.h"
+
 namespace felt {
 namespace {
 

@@ -166,6 +166,7 @@ Sample take_sample(const std::filesystem::path& path, const SequenceOptions& opt
   for (size_t i = 0; i < positions.size(); ++i) {
     if (!frames[i]) {
       ++sample.skipped[reasons[i]];
+      sample.skipped_frames[reasons[i]].push_back(listing.frames[size_t(positions[i])].index);
       continue;
     }
     for (const SampledFrame::Point& point : frames[i]->points) depths.push_back(point.depth_m);

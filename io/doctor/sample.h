@@ -20,7 +20,8 @@ struct SamplePlan {
 
 struct Sample {
   GeometrySample geometry;
-  std::map<std::string, int64_t> skipped;  ///< sampled frames that could not be read, by reason
+  std::map<std::string, int64_t> skipped;                      ///< sampled frames that could not be read, by reason
+  std::map<std::string, std::vector<int64_t>> skipped_frames;  ///< numbers of these
 };
 
 /// Decodes the sample. `listing`: of all frames; it is as before when this returns.

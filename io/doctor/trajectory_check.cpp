@@ -8,13 +8,18 @@
 #include <optional>
 #include <set>
 
+#include "core/text.h"
 #include "io/doctor/sample.h"
 
 namespace felt {
 namespace {
 
+bool overlaps(const PairScore& score) { return score.in_view > 0.1; }
 /// A pair whose frames see each other and whose surfaces mostly meet.
-bool fits(const PairScore& score) { return score.in_view > 0.1 && score.meets > 0.4; }
+bool fits(const PairScore& score) { return overlaps(score) && score.meets > 0.4; }
+
+/// Fewer pairs that overlap say nothing.
+constexpr int kLeastPairs = 3;
 
 struct Step {
   size_t from = 0;  ///< position in the trajectory
@@ -115,15 +120,22 @@ Finding check_trajectory(const GeometrySample& sample, const Reading& best, cons
   std::vector<Pair> neighbours;
   for (const auto& [a, pair] : nearest) neighbours.push_back(pair);
   const std::vector<PairScore> scores = cross_project(sample.frames, neighbours, trajectory, sample.camera, best);
-  const auto fitting = double(std::count_if(scores.begin(), scores.end(), fits));
-  const double share = scores.empty() ? 1 : fitting / double(scores.size());
-  finding.evidence = std::to_string(int(fitting)) + " of " + std::to_string(scores.size()) +
-                     " neighbouring frame pairs see the same surface";
+  const auto overlapping = std::count_if(scores.begin(), scores.end(), overlaps);
+  const auto fitting = std::count_if(scores.begin(), scores.end(), fits);
+  // A few frames of a sound recording may show different sides of everything; many overlap.
+  const auto asked = sample.frames.size() < kFewFrames ? size_t(overlapping) : scores.size();
+  const double share = asked == 0 ? 1 : double(fitting) / double(asked);
+  finding.evidence =
+      std::to_string(fitting) + " of " + std::to_string(asked) + " neighbouring frame pairs see the same surface";
   // Poses that are told a delay are between frames: which of them is whose cannot be asked.
   const bool slow = share >= 0.5 && best.pose_delay == 0;
-  const int exchanged = slow && scores.size() >= 3 ? better_exchanged(sample, best) : 0;
+  const int exchanged = slow && overlapping >= kLeastPairs ? better_exchanged(sample, best) : 0;
   const bool disordered = exchanged >= 3 && exchanged >= 0.4 * double(sample.frames.size());
-  if (scores.size() >= 3 && (share < 0.5 || disordered)) {
+  if (overlapping < kLeastPairs) {
+    finding.confidence = 0.5;
+    finding.belief = "it cannot be told whether the trajectory fits the images: too few views overlap";
+    return finding;
+  } else if (share < 0.5 || disordered) {
     const double rough = smoothness(trajectory);
     finding.faulty = true;
     finding.confidence = disordered ? 0.8 : std::min(0.97, 1 - share);

@@ -1,12 +1,17 @@
 #include "io/doctor/doctor.h"
 
 #include <catch2/catch.hpp>
+#include <map>
 
 #include "bench/support/corrupt.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "io/doctor/file_check.h"
 #include "io/doctor/geometry_findings.h"
 #include "io/doctor/label_check.h"
 #include "io/doctor/sample.h"
 #include "tests/support/data.h"
+#include "tests/support/recorded_sequence.h"
 
 using namespace felt;
 using namespace felt::test;
@@ -212,6 +217,59 @@ TEST_CASE("few frames tell no delay, and the doctor says so") {
   CHECK_THAT(finding->belief, Catch::Contains("cannot be told from 7 frames"));
 }
 
+TEST_CASE("the doctor looks at the selected frames only") {
+  const TemporaryDirectory folder;
+  const fs::path path = folder.path() / "room";
+  corrupt::sound_copy(room(), path, 12);
+  const std::vector<FrameRecord> recorded = list_sequence(path).frames;
+  fs::copy_file(recorded.at(10).depth.path, recorded.at(11).depth.path, fs::copy_options::overwrite_existing);
+  CHECK(accused(examine_sequence(path), "duplicates") != nullptr);
+  const Examination examination = examine_sequence(path, {.frames = {.last = 11}});
+  CHECK(accused(examination, "duplicates") == nullptr);
+  CHECK(examination.recorded_frames == 12);
+  CHECK(examination.selected_frames == 11);
+  CHECK(examination.sampled_frames == 11);
+  CHECK_THROWS_AS(examine_sequence(path, {.frames = {.first = 20}}), ConfigError);
+}
+
+TEST_CASE("what the doctor finds sound it does not call anything else") {
+  SequenceListing listing = list_sequence(room());
+  const GeometrySample sample = take_sample(room(), {}, listing, {}).geometry;
+  const auto belief = [&](const Reading& best, const std::string& topic) -> std::string {
+    for (const Finding& finding : geometry_findings(sample, best, true))
+      if (finding.topic == topic && !finding.faulty) return finding.belief;
+    return "";
+  };
+  Reading beside = sample.now;
+  beside.focal_factor = 1.02, beside.depth_factor = 1.01, beside.pose_delay = 0.05;
+  const std::string scale = "stored depth counts " + number_text(sample.depth_scale, "%.6g") + " a metre";
+  for (const auto& [topic, right] : std::map<std::string, std::string>{
+           {"depth-scale", scale},
+           {"focal-length", "the given focal length is right"},
+           {"stamp-offset", "poses are those of the moments at which depth was taken"}}) {
+    INFO(topic);
+    CHECK(belief(sample.now, topic) == right);
+    CHECK_THAT(belief(beside, topic),
+               Catch::StartsWith(right + ", within what sensors differ by (") && Catch::EndsWith(" fits best)"));
+  }
+}
+
+TEST_CASE("frames that are skipped are not said to be there") {
+  const TemporaryDirectory folder;
+  write_tum(folder.path(), 4);
+  const auto frames = [&](const SequenceOptions& options) {
+    return check_frames(list_sequence(folder.path(), options));
+  };
+  CHECK(frames({}).belief == "all frames are there");
+  write_text(folder.path() / "rgb.txt",
+             "100.003000 rgb/100.003000.png\n100.103000 rgb/100.103000.png\n100.203000 rgb/100.203000.png\n");
+  CHECK_FALSE(frames({}).faulty);
+  CHECK(frames({}).belief ==
+        "every depth image is there; 1 of 4 frames are skipped as they have no colour of their own (--no-color uses "
+        "them)");
+  CHECK(frames({.read_color = false}).belief == "all frames are there");
+}
+
 TEST_CASE("scans without poses want a pose file, not another copy") {
   const TemporaryDirectory folder;
   for (const char* name : {"000000.bin", "000001.bin"}) {
@@ -222,4 +280,42 @@ TEST_CASE("scans without poses want a pose file, not another copy") {
   const Finding* finding = accused(examination, "frames");
   REQUIRE(finding != nullptr);
   CHECK_THAT(finding->remedy, Catch::StartsWith("add poses.txt"));
+}
+
+TEST_CASE("shares are written as whole per cents from ten up") {
+  CHECK(percent_text(1) == "100 %");
+  CHECK(percent_text(0.996) == "100 %");
+  CHECK(percent_text(0.123) == "12 %");
+  CHECK(percent_text(0.041) == "4.1 %");
+  CHECK(percent_text(0.000026) == "0.0026 %");
+}
+
+TEST_CASE("a reading in use that fits is not said to fit nowhere, though a search ended elsewhere") {
+  SequenceListing listing = list_sequence(room());
+  const GeometrySample sample = take_sample(room(), {}, listing, {}).geometry;
+  Reading astray = sample.now;
+  astray.depth_factor = 50;
+  for (const Finding& finding : geometry_findings(sample, astray, false)) {
+    INFO(finding.topic);
+    CHECK_FALSE(finding.faulty);
+    CHECK(finding.topic != "fit");
+  }
+}
+
+TEST_CASE("the doctor names frames whose images cannot be read") {
+  const TemporaryDirectory folder;
+  const fs::path path = folder.path() / "room";
+  corrupt::sound_copy(room(), path, 8);
+  const std::vector<FrameRecord> frames = list_sequence(path).frames;
+  for (const size_t broken : {2, 5}) fs::resize_file(frames.at(broken).depth.path, 200);
+  const Examination some = examine_sequence(path);
+  const Finding* finding = accused(some, "frames");
+  REQUIRE(finding != nullptr);
+  CHECK_THAT(finding->belief, Catch::StartsWith("2 sampled frames have images"));
+  CHECK_THAT(finding->evidence, Catch::Contains("depth image in sampled frames 2, 5"));
+  for (const FrameRecord& frame : frames) fs::resize_file(frame.depth.path, 200);
+  const Examination none = examine_sequence(path);
+  finding = accused(none, "frames");
+  REQUIRE(finding != nullptr);
+  CHECK(finding->belief == "no sampled frame can be read");
 }

@@ -1,6 +1,8 @@
 // Recordings as people have them: parts of them, folders as shells complete them, stamps that were never set.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstring>
+#include <iterator>
 
 #include "core/error.h"
 #include "io/doctor/doctor.h"
@@ -24,20 +26,25 @@ void append(std::string& bytes, const T& value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-/// A container of raw depth with these stamps, microseconds.
-std::string sens_container(const std::vector<uint64_t>& stamps) {
+/// A container of raw depth, 1.5 m, with these stamps, microseconds, and in every frame this colour image (PNG; none
+/// where it is empty) of a camera `color_x_m` to the right of the depth camera.
+std::string sens_container(const std::vector<uint64_t>& stamps, const std::string& color = "", float color_x_m = 0) {
   std::string bytes;
   append(bytes, uint32_t(4)), append(bytes, uint64_t(1));
   bytes += 's';
   const float identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   const float camera[16] = {20, 0, 11.5f, 0, 0, 20, 7.5f, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-  for (const auto* matrix : {&camera, &identity, &camera, &identity}) append(bytes, *matrix);
+  float color_pose[16];
+  std::copy(std::begin(identity), std::end(identity), color_pose);
+  color_pose[3] = color_x_m;
+  append(bytes, camera), append(bytes, color_pose), append(bytes, camera), append(bytes, identity);
   append(bytes, int32_t(1)), append(bytes, int32_t(0));
   for (const int size : {kWidth, kHeight, kWidth, kHeight}) append(bytes, uint32_t(size));
   append(bytes, 1000.0f), append(bytes, uint64_t(stamps.size()));
   for (const uint64_t stamp : stamps) {
     append(bytes, identity), append(bytes, stamp), append(bytes, stamp);
-    append(bytes, uint64_t(0)), append(bytes, uint64_t(kWidth * kHeight * 2));
+    append(bytes, uint64_t(color.size())), append(bytes, uint64_t(kWidth * kHeight * 2));
+    bytes += color;
     for (int i = 0; i < kWidth * kHeight; ++i) append(bytes, uint16_t(1500));
   }
   return bytes;
@@ -110,6 +117,18 @@ TEST_CASE("stamps of a container count where they ascend; frame numbers stand fo
   CHECK(std::holds_alternative<Frame>(open_sequence(folder.path() / "tum")->read(2)));
 }
 
+TEST_CASE("colour of a container's camera beside its depth camera is taken where depth projects into it") {
+  TemporaryDirectory folder;
+  const auto png = encode_png(color_image(0));
+  const std::string image(png.begin(), png.end());
+  write_text(folder.path() / "one.sens", sens_container({1000000}, image));
+  CHECK(frame_of(*open_sequence(folder.path() / "one.sens"), 0).color == color_image(0));
+  // 5 cm to the right: a point at 1.5 m moves 20 * 0.05 / 1.5 = 2 / 3 pixels to the left.
+  write_text(folder.path() / "beside.sens", sens_container({1000000}, image, 0.05f));
+  const Frame frame = frame_of(*open_sequence(folder.path() / "beside.sens"), 0);
+  for (int u = 2; u < kWidth; ++u) CHECK(int(frame.color(u, 3).r) == 10 * (u - 1));
+}
+
 TEST_CASE("a container cut short keeps its whole frames, and those that it lost are counted") {
   TemporaryDirectory folder;
   const fs::path path = folder.path() / "a.sens";
@@ -132,7 +151,7 @@ TEST_CASE("a container cut short keeps its whole frames, and those that it lost 
       REQUIRE(skip != nullptr);
       CHECK(skip->reason == (more > kFrameHeaderBytes && i == 2 ? "truncated depth image" : "missing depth image"));
     }
-    const Finding finding = check_files(list_sequence(path, {})).front();
+    const Finding finding = check_frames(list_sequence(path, {}));
     CHECK(finding.topic == "frames");
     CHECK(finding.faulty);
     CHECK_THAT(finding.belief, Catch::Contains("3 frames"));
