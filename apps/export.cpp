@@ -1,3 +1,6 @@
+#include <spdlog/spdlog.h>
+
+#include <Eigen/Geometry>
 #include <cstdio>
 #include <map>
 #include <memory>
@@ -37,10 +40,9 @@ struct ExportOptions : CommonOptions {
 };
 
 void check(const ExportOptions& o) {
-  std::vector<std::string> problems;
   if (o.vdb.empty() && o.mesh.empty() && o.points.empty() && o.html.empty())
-    problems.push_back(
-        describe_mismatch("export", "what to write", "--vdb, --mesh, --points or --html", "none of them"));
+    throw CLI::RequiredError("--vdb, --mesh, --points or --html");
+  std::vector<std::string> problems;
   if (o.vdb.empty() && (o.half || o.compact || !o.grids.empty()))
     problems.push_back(describe_mismatch("--grids, --half, --compact", "what to write", "--vdb FILE", "no --vdb"));
   if (o.compact && (o.half || !o.grids.empty()))
@@ -71,17 +73,29 @@ int slot_of_class(const Map& map, const ExportOptions& o) {
                                       '"' + o.class_name + '"'));
 }
 
-/// What the parts that were asked for have in common; nothing where the whole map was.
-std::optional<Region> part_of_map(const Map& map, const ExportOptions& o) {
-  std::optional<Region> part;
-  const auto only = [&](const Region& region) { part = part ? intersected(*part, region) : region; };
-  if (!o.box_m.empty()) only(voxels_in(map, {Eigen::Vector3d::Map(o.box_m.data()), Eigen::Vector3d::Map(&o.box_m[3])}));
-  if (!o.class_name.empty()) only(voxels_of_class(map, slot_of_class(map, o)));
+/// The part of a map that was asked for: what its limits have in common.
+struct Part {
+  std::optional<Eigen::AlignedBox3d> box_m;
+  std::optional<Region> things;  ///< of --class and --segment-at
+  std::optional<Region> voxels;  ///< all limits together; nothing where the whole map was asked for
+};
+
+Part part_of_map(const Map& map, const ExportOptions& o) {
+  Part part;
+  const auto only = [](std::optional<Region>& limited, const Region& region) {
+    limited = limited ? intersected(*limited, region) : region;
+  };
+  if (!o.class_name.empty()) only(part.things, voxels_of_class(map, slot_of_class(map, o)));
   if (!o.segment_at.empty()) {
     const RegionSettings settings = o.segment.resolved(map);
     const Contact contact = find_contact(map, point_of(o.segment_at), settings);
     const std::optional<ViewMask> view = o.segment.view();
-    only(view ? find_region(map, *view, settings, &contact) : find_region(map, contact, settings));
+    only(part.things, view ? find_region(map, *view, settings, &contact) : find_region(map, contact, settings));
+  }
+  part.voxels = part.things;
+  if (!o.box_m.empty()) {
+    part.box_m.emplace(Eigen::Vector3d::Map(o.box_m.data()), Eigen::Vector3d::Map(&o.box_m[3]));
+    only(part.voxels, voxels_in(map, *part.box_m));
   }
   return part;
 }
@@ -96,25 +110,44 @@ json write_vdb(const Map& map, const Region* part, const ExportOptions& o) {
     save_map(saved, o.vdb, o.compact ? SaveOptions{MapCompression::zip, false} : SaveOptions{});
     written["active_voxels"] = active_voxel_count(saved);
   } else {
-    written["grids"] = export_vdb(map, o.vdb, {.grids = o.grids, .half = o.half, .part = part});
+    const ExportedGrids grids = export_vdb(map, o.vdb, {.grids = o.grids, .half = o.half, .part = part});
+    written["grids"] = grids.names;
+    if (o.half) written["in_32_bits"] = grids.in_32_bits;
+    for (const std::string& grid : grids.in_32_bits)
+      spdlog::warn("{}: grid '{}': written in 32 bits, as 16 hold no numbers beyond 65504 and few digits below 6e-5",
+                   o.vdb.string(), grid);
   }
   written["bytes"] = fs::file_size(o.vdb);
   return written;
 }
 
-json write_surface(const Map& map, const Region* part, const ExportOptions& o) {
+/// What was asked for may hold voxels and no surface: between two faces of a thing, or narrower than a triangle.
+void warn_if_empty(const fs::path& file, size_t count, const char* what) {
+  if (!file.empty() && count == 0)
+    spdlog::warn("{}: empty: no {} of the surface lies in what was asked for", file.string(), what);
+}
+
+json write_surface(const Map& map, const Part& part, const ExportOptions& o) {
   const SurfaceColor color = parse_surface_color(o.color_by, map);
   std::vector<VertexEdge> edges;
   TriangleMesh mesh = extract_mesh(map, {}, &edges);
   attach_beliefs(map, edges, mesh);
   const std::optional<ColorRange> range = color_surface(map, edges, color, mesh);
-  if (part != nullptr) {
-    std::vector<bool> inside(edges.size());
-    for (size_t i = 0; i < edges.size(); ++i) inside[i] = part->contains(nearest_voxel(edges[i]));
-    mesh = felt::part_of(mesh, [&](const Triangle& t) { return inside[t[0]] && inside[t[1]] && inside[t[2]]; });
-  }
+  // A vertex belongs to the thing of its nearest voxel, and lies in the box or not by its own position.
+  std::vector<bool> inside(edges.size(), true);
+  for (size_t i = 0; i < edges.size(); ++i)
+    inside[i] = (!part.things || part.things->contains(nearest_voxel(edges[i]))) &&
+                (!part.box_m || part.box_m->contains(mesh.positions[i].cast<double>()));
+  TriangleMesh points;
+  if (!o.points.empty()) points = points_of(mesh, [&](uint32_t vertex) { return inside[vertex]; });
+  if (part.voxels)
+    mesh = part_of(mesh, [&](const Triangle& t) { return inside[t[0]] && inside[t[1]] && inside[t[2]]; });
   json written = json::object();
-  warn_if_coarse(mesh, !o.mesh.empty() ? o.mesh : !o.points.empty() ? o.points : o.html);
+  warn_if_empty(o.mesh, mesh.triangles.size(), "triangle");
+  warn_if_empty(o.html, mesh.triangles.size(), "triangle");
+  warn_if_empty(o.points, points.positions.size(), "vertex");
+  const bool only_points = o.mesh.empty() && o.html.empty();
+  warn_if_coarse(only_points ? points : mesh, only_points ? o.points : !o.mesh.empty() ? o.mesh : o.html);
   if (!o.mesh.empty()) {
     write_mesh(o.mesh, mesh);
     written["mesh"] = {
@@ -125,10 +158,8 @@ json write_surface(const Map& map, const Region* part, const ExportOptions& o) {
     written["html"] = {{"path", o.html.string()}, {"bytes", fs::file_size(o.html)}};
   }
   if (!o.points.empty()) {
-    mesh.triangles.clear();
-    mesh.triangle_scalars.clear();
-    write_mesh(o.points, mesh);
-    written["points"] = {{"path", o.points.string()}, {"points", mesh.positions.size()}};
+    write_mesh(o.points, points);
+    written["points"] = {{"path", o.points.string()}, {"points", points.positions.size()}};
   }
   if (range) written["colors"] = {{"by", o.color_by}, {"black", range->low}, {"yellow", range->high}};
   return written;
@@ -136,15 +167,20 @@ json write_surface(const Map& map, const Region* part, const ExportOptions& o) {
 
 int run(const ExportOptions& o) {
   check(o);
+  // From before the map is read, which may be the one that is written anew.
+  std::optional<MapWriting> writing;
+  if (!o.vdb.empty()) {
+    writing.emplace(o.vdb, o.overwrite);
+    require_no_file(o.vdb, o.overwrite);  // others may have made one while this waited
+  }
   Map map = load_map(o.map);
   use_properties(map, o.properties);
-  const std::optional<Region> part = part_of_map(map, o);
-  if (part && part->voxels() == 0)
+  const Part part = part_of_map(map, o);
+  if (part.voxels && part.voxels->voxels() == 0)
     throw ConfigError(describe_mismatch(o.map.string(), "part to export", "at least one voxel of the map", "none"));
   json written = json::object();
-  if (!o.vdb.empty()) written["vdb"] = write_vdb(map, part ? &*part : nullptr, o);
-  if (!o.mesh.empty() || !o.points.empty() || !o.html.empty())
-    written.update(write_surface(map, part ? &*part : nullptr, o));
+  if (!o.vdb.empty()) written["vdb"] = write_vdb(map, part.voxels ? &*part.voxels : nullptr, o);
+  if (!o.mesh.empty() || !o.points.empty() || !o.html.empty()) written.update(write_surface(map, part, o));
   if (o.json) {
     print_json(written);
   } else if (!o.quiet) {
@@ -183,7 +219,7 @@ void add_export(CLI::App& app) {
   command.add_option("--grids", o->grids, "Grids to write, by name; evidence/ stands for all that begin so")
       ->delimiter(',')
       ->option_text("NAME,...");
-  command.add_flag("--half", o->half, "Store floats in 16 bits");
+  command.add_flag("--half", o->half, "Store floats in 16 bits, but for grids that these cannot hold");
   command.add_flag("--compact", o->compact, "A map file of least size: DEFLATE, and no grids that only viewers need");
   command.add_option("--color-by", o->color_by, "rgb, class, entropy, <property>.mean or <property>.sd")
       ->capture_default_str();

@@ -1,7 +1,10 @@
-#include <algorithm>
+#include <Eigen/Core>
+#include <cmath>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <type_traits>
 #include <vector>
 
@@ -12,6 +15,7 @@
 #include "core/error.h"
 #include "io/map_file/map_file.h"
 #include "io/map_file/map_grids.h"
+#include "io/map_file/map_metadata.h"
 #include "io/pictures/picture.h"
 #include "io/pictures/sequence_picture.h"
 #include "io/sequence/open_sequence.h"
@@ -30,32 +34,89 @@ Json classes_json(const ClassTable& table) {
   return classes;
 }
 
-/// Of numbers also the least, greatest and mean active value.
-template <typename Value>
-Json grid_json(const Leaves<Value>& leaves) {
-  uint64_t active_voxels = 0;
-  double sum = 0, least = std::numeric_limits<double>::infinity(), greatest = -least;
+/// Calls `visit(value)` for every active voxel of a grid.
+template <typename Value, typename Visit>
+void for_each_active(const Leaves<Value>& leaves, const Visit& visit) {
   std::vector<Value> values(kBlockVoxels);
   for (size_t i = 0; i < leaves.coords->size(); ++i)
-    for_each_bit(leaves.fill(i, values.data()), [&](int v) {
-      ++active_voxels;
-      if constexpr (std::is_same_v<Value, float>) {
-        const double value = double(values[size_t(v)]);
-        sum += value, least = std::min(least, value), greatest = std::max(greatest, value);
-      }
-    });
+    for_each_bit(leaves.fill(i, values.data()), [&](int v) { visit(values[size_t(v)]); });
+}
+
+/// Least, greatest and mean active value; of colours three of each, for red, green and blue.
+template <typename Value>
+Json grid_json(const Leaves<Value>& leaves) {
+  using Numbers = Eigen::Array<double, std::is_same_v<Value, openvdb::Vec3s> ? 3 : 1, 1>;
+  uint64_t active_voxels = 0;
+  Numbers sum = Numbers::Zero(), least = Numbers::Constant(std::numeric_limits<double>::infinity()), greatest = -least;
+  for_each_active(leaves, [&](const Value& value) {
+    Numbers numbers;
+    if constexpr (std::is_same_v<Value, openvdb::Vec3s>)
+      numbers << double(value.x()), double(value.y()), double(value.z());
+    else
+      numbers << double(value);
+    ++active_voxels;
+    sum += numbers, least = least.min(numbers), greatest = greatest.max(numbers);
+  });
+  const auto json = [](const Numbers& numbers) {
+    return numbers.size() == 1 ? Json(numbers[0]) : Json(std::vector<double>(numbers.begin(), numbers.end()));
+  };
   Json entry = {{"active_voxels", active_voxels}};
-  if (std::is_same_v<Value, float> && active_voxels > 0)
-    entry.update({{"least", least}, {"greatest", greatest}, {"mean", sum / double(active_voxels)}});
+  if (active_voxels > 0)
+    entry.update({{"least", json(least)}, {"greatest", json(greatest)}, {"mean", json(sum / double(active_voxels))}});
   return entry;
 }
 Json grid_json(const Region& region) { return {{"active_voxels", region.voxels()}}; }
 
+/// A mean of ids says nothing: how many voxels each class has, in the order of the class table.
+Json label_json(const Leaves<int32_t>& leaves, const ClassTable& table) {
+  uint64_t active_voxels = 0;
+  std::map<int32_t, uint64_t> voxels;
+  for_each_active(leaves, [&](int32_t id) { ++active_voxels, ++voxels[id]; });
+  Json classes = Json::object();
+  for (const ClassInfo& info : table.classes())
+    if (const auto found = voxels.find(info.id); found != voxels.end()) classes[info.name] = found->second;
+  return {{"active_voxels", active_voxels}, {"voxels_of_class", classes}};
+}
+
+/// Nor does one of instances' ids: how many instances there are.
+Json instance_json(const Leaves<int32_t>& leaves) {
+  uint64_t active_voxels = 0;
+  std::set<int32_t> ids;
+  for_each_active(leaves, [&](int32_t id) { ++active_voxels, ids.insert(id); });
+  return {{"active_voxels", active_voxels}, {"instances", ids.size()}};
+}
+
 Json grids_json(const Map& map) {
   Json grids = Json::object();
   for (const LeafGrid& grid : map_grids(map))
-    grids[grid.name] = std::visit([](const auto& leaves) { return grid_json(leaves); }, grid.leaves);
+    grids[grid.name] = grid.name == "label" ? label_json(std::get<Leaves<int32_t>>(grid.leaves), map.classes)
+                       : grid.name == "instance"
+                           ? instance_json(std::get<Leaves<int32_t>>(grid.leaves))
+                           : std::visit([](const auto& leaves) { return grid_json(leaves); }, grid.leaves);
   return grids;
+}
+
+/// The property table; a support without end is left out.
+Json properties_json(const PropertyTable& table) {
+  Json properties = Json::array();
+  for (const Property& property : table.properties()) {
+    Json entry = {{"name", property.name}, {"unit", property.unit}, {"rho", property.rho}};
+    if (std::isfinite(property.support_lo)) entry["at_least"] = property.support_lo;
+    if (std::isfinite(property.support_hi)) entry["at_most"] = property.support_hi;
+    entry["priors"] = Json::object();
+    for (const auto& [name, prior] : property.priors)
+      entry["priors"][name] = {{"mean", prior.mean}, {"sd", prior.sd}, {"readings", prior.readings}};
+    properties.push_back(entry);
+  }
+  return properties;
+}
+
+/// Which frames of which recordings, a run of settings each; frames as [first, step, count].
+Json recordings_json(const FrameJournal& journal) {
+  Json recordings = Json::array();
+  for (const FusedFrames& run : journal.runs)
+    recordings.push_back({{"recording", run.sequence}, {"frames", frame_runs(run.frames)}});
+  return recordings;
 }
 
 Json describe_map(const fs::path& file, bool with_grids) {
@@ -65,6 +126,7 @@ Json describe_map(const fs::path& file, bool with_grids) {
   json["kind"] = "map";
   json["path"] = file.string();
   json["file_bytes"] = fs::file_size(file);
+  json["format_version"] = kMapFileVersion;
   json["voxel_size_m"] = map.voxel_size_m;
   json["truncation_m"] = map.truncation_m;
   json["blocks"] = map.store.size();
@@ -74,8 +136,10 @@ Json describe_map(const fs::path& file, bool with_grids) {
   json["bytes"] = {
       {"tsdf", map.store.geometry_bytes()}, {"color", map.store.color_bytes()}, {"classes", class_bytes(map)}};
   json["frames"] = frame_count(map.frames);
+  json["recordings"] = recordings_json(map.frames);
   json["touches"] = map.touches.touches.size();
   json["classes"] = classes_json(map.classes);
+  json["properties"] = properties_json(map.properties);
   if (with_grids) json["grids"] = grids_json(map);
   json["map_hash"] = map_hash(map);
   Json metadata = Json::object();
@@ -167,7 +231,8 @@ void add_info(CLI::App& app) {
                    "feltmap info result/map.vdb\nfeltmap info recording --json --pictures looks"},
                   a->common, [a] { return run(a->path, a->reading, a->grids, a->pictures, a->common); });
   command.add_option("PATH", a->path, "A map file, or a folder (or .sens file) of a recorded sequence")->required();
-  command.add_flag("--grids", a->grids, "Of a map also every grid: active voxels, least, greatest and mean value");
+  command.add_flag("--grids", a->grids,
+                   "Of a map also every grid: active voxels, least, greatest and mean value; voxels of each class");
   command.add_option("--pictures", a->pictures, "Folder for thumbnails.png and trajectory.png of a sequence");
   add_reading_options(command, a->reading);
 }

@@ -7,7 +7,6 @@
 #include "apps/exit_code.h"
 #include "core/error.h"
 #include "io/map_file/map_file.h"
-#include "mapping/maps/map_verify.h"
 
 namespace felt::apps {
 namespace {
@@ -28,24 +27,28 @@ int print(const Options& options, const nlohmann::json& report, const std::strin
 int run(const Options& options) {
   nlohmann::json report = {{"map", options.map}, {"sound", false}, {"faults", nlohmann::json::array()}};
   try {
-    const Map map = load_map(options.map);
+    const ExaminedMap examined = examine_map(options.map);
+    const Map& map = examined.map;
     report["map_hash"] = map_hash(map);
     report["blocks"] = map.store.size();
     report["active_voxels"] = active_voxel_count(map);
+    report["views"] = examined.views;
     std::string text;
-    for (const MapFault& fault : verify(map)) {
+    for (const MapFault& fault : examined.faults) {
       report["faults"].push_back({{"grid", fault.grid},
                                   {"broken", fault.broken},
                                   {"voxels", fault.voxels},
                                   {"first", {fault.first.x, fault.first.y, fault.first.z}}});
-      text += options.map + ": " + fault.grid + ": not so: " + fault.broken + ": " + std::to_string(fault.voxels) +
-              " voxels, the first at (" + std::to_string(fault.first.x) + ", " + std::to_string(fault.first.y) + ", " +
-              std::to_string(fault.first.z) + ")\n";
+      text += options.map + ": " + fault.grid + ": not so: " + fault.broken;
+      if (fault.voxels > 0)
+        text += ": " + std::to_string(fault.voxels) + " voxels, the first at (" + std::to_string(fault.first.x) + ", " +
+                std::to_string(fault.first.y) + ", " + std::to_string(fault.first.z) + ")";
+      text += "\n";
     }
     report["sound"] = report["faults"].empty();
     if (report["sound"])
       text = options.map + ": sound: checksum, hash and every invariant of " + std::to_string(map.store.size()) +
-             " blocks\n";
+             " blocks, and " + std::to_string(examined.views) + " views that follow from them\n";
     return print(options, report, text);
   } catch (const FormatError& error) {
     report["faults"].push_back({{"grid", "file"}, {"broken", error.what()}});
@@ -57,10 +60,11 @@ int run(const Options& options) {
 
 void add_verify(CLI::App& app) {
   const auto options = std::make_shared<Options>();
-  CLI::App& command = add_command(app,
-                                  {"verify", "Check a map file: checksum, hash and every invariant of its values.",
-                                   "feltmap verify out/map.vdb\nfeltmap verify out/map.vdb --json"},
-                                  options->common, [options] { return run(*options); });
+  CLI::App& command =
+      add_command(app,
+                  {"verify", "Check a map file: checksum, hash, every invariant of its values, and its views",
+                   "feltmap verify out/map.vdb\nfeltmap verify out/map.vdb --json"},
+                  options->common, [options] { return run(*options); });
   command.add_option("MAP", options->map, "Map file (map.vdb)")->required();
 }
 

@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "mapping/map.h"
+#include "mapping/maps/map_verify.h"
 
 namespace felt {
 
@@ -34,6 +36,17 @@ std::string save_map(const Map& map, const std::filesystem::path& path, const Sa
 /// checksum is verified before any of the content is interpreted. Throws IoError where the file cannot be read and
 /// FormatError, with the reason, where it is no map file, has an unknown version, or was changed in any byte.
 Map load_map(const std::filesystem::path& path);
+
+/// A map file looked at as a whole.
+struct ExaminedMap {
+  Map map;
+  std::vector<MapFault> faults;  ///< of the map (`verify`), and of the views that its file holds
+  size_t views = 0;              ///< how many views the file holds
+};
+
+/// Loads a map, checks every invariant of it, and makes every view of its file anew to compare. Throws as `load_map`
+/// does.
+ExaminedMap examine_map(const std::filesystem::path& path);
 
 /// What a map was made of.
 struct MapJournals {

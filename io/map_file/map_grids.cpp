@@ -1,6 +1,10 @@
 #include "io/map_file/map_grids.h"
 
+#include <openvdb/io/Compression.h>
+
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <iterator>
 #include <memory>
 #include <utility>
@@ -28,6 +32,22 @@ void require_known(const std::vector<LeafGrid>& all, const std::vector<std::stri
     if (std::none_of(all.begin(), all.end(), [&](const LeafGrid& grid) { return chosen(grid.name, {a}); }))
       problems.push_back(describe_mismatch("--grids", "grid of the map", "one of " + names, "'" + a + "'"));
   if (!problems.empty()) throw ConfigError(problems);
+}
+
+/// Whether floats of 16 bits hold what a grid shows: they end at 65,504, and below 2^-14 they have fewer digits the
+/// smaller they are. Only a grid that is small throughout loses by that: elsewhere it is less than the rounding of its
+/// greatest values. Whole numbers and masks are not touched.
+bool fits_16_bits(const LeafGrid& grid) {
+  const auto* leaves = std::get_if<Leaves<float>>(&grid.leaves);
+  if (leaves == nullptr) return true;
+  constexpr float kLeastNormal = 1.0f / (1 << 14);
+  float greatest = std::abs(leaves->background);
+  std::array<float, kBlockVoxels> values;
+  for (size_t i = 0; i < leaves->coords->size(); ++i) {
+    leaves->fill(i, values.data());
+    for (const float value : values) greatest = std::max(greatest, std::abs(value));
+  }
+  return greatest == 0 || (greatest >= kLeastNormal && std::isfinite(openvdb::io::truncateRealToHalf(greatest)));
 }
 
 }  // namespace
@@ -68,7 +88,7 @@ std::vector<LeafGrid> map_grids(const Map& map) {
   return grids;
 }
 
-std::vector<std::string> export_vdb(const Map& map, const std::filesystem::path& path, const VdbExport& options) {
+ExportedGrids export_vdb(const Map& map, const std::filesystem::path& path, const VdbExport& options) {
   openvdb::initialize();
   std::vector<LeafGrid> grids = map_grids(map);
   require_known(grids, options.grids);
@@ -79,13 +99,16 @@ std::vector<std::string> export_vdb(const Map& map, const std::filesystem::path&
   metadata.insertMeta("map_hash", openvdb::StringMetadata(hash));
   VdbWriter file(path);
   file.begin(metadata, grids.size(), hash);
-  std::vector<std::string> names;
-  for (const LeafGrid& grid : grids) {
-    file.write(options.part != nullptr ? clipped(grid, *options.part) : grid, VdbCodec::zip, options.half);
-    names.push_back(grid.name);
+  ExportedGrids written;
+  for (const LeafGrid& whole : grids) {
+    const LeafGrid grid = options.part != nullptr ? clipped(whole, *options.part) : whole;
+    const bool in_16_bits = options.half && fits_16_bits(grid);
+    file.write(grid, VdbCodec::zip, in_16_bits);
+    written.names.push_back(grid.name);
+    if (options.half && !in_16_bits) written.in_32_bits.push_back(grid.name);
   }
   file.commit();
-  return names;
+  return written;
 }
 
 }  // namespace felt

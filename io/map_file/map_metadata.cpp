@@ -57,19 +57,6 @@ ClassTable classes_from_json(const json& rows) {
 /// A count in a file takes memory that the file's size does not justify: 80 MB at most. 92 hours at 30 frames a second.
 constexpr int64_t kMostFrames = 10'000'000;
 
-/// Frames as [first, step, count] triples: a recording that was fused whole is one triple.
-json frames_to_json(const std::vector<int64_t>& frames) {
-  json triples = json::array();
-  for (size_t i = 0; i < frames.size();) {
-    size_t end = i + 1;
-    const int64_t step = end < frames.size() ? frames[end] - frames[i] : 1;
-    while (end < frames.size() && frames[end] - frames[end - 1] == step) ++end;
-    triples.push_back({frames[i], step, end - i});
-    i = end;
-  }
-  return triples;
-}
-
 /// `left`: how many more frames the whole journal may name.
 std::vector<int64_t> frames_from_json(const json& triples, int64_t& left) {
   const auto number = [](const json& triple, size_t i) { return whole_number<int64_t>(triple.at(i)); };
@@ -95,7 +82,7 @@ std::vector<int64_t> frames_from_json(const json& triples, int64_t& left) {
 json journal_to_json(const FrameJournal& journal) {
   json runs = json::array();
   for (const FusedFrames& run : journal.runs)
-    runs.push_back({{"sequence", run.sequence}, {"settings", run.settings}, {"frames", frames_to_json(run.frames)}});
+    runs.push_back({{"sequence", run.sequence}, {"settings", run.settings}, {"frames", frame_runs(run.frames)}});
   return runs;
 }
 
@@ -137,6 +124,18 @@ auto parsed(const openvdb::MetaMap& metadata, const char* key, const std::string
 }
 
 }  // namespace
+
+std::vector<std::array<int64_t, 3>> frame_runs(const std::vector<int64_t>& frames) {
+  std::vector<std::array<int64_t, 3>> triples;
+  for (size_t i = 0; i < frames.size();) {
+    size_t end = i + 1;
+    const int64_t step = end < frames.size() ? frames[end] - frames[i] : 1;
+    while (end < frames.size() && frames[end] - frames[end - 1] == step) ++end;
+    triples.push_back({frames[i], step, int64_t(end - i)});
+    i = end;
+  }
+  return triples;
+}
 
 openvdb::MetaMap to_metadata(const Map& map, const std::string& hash) {
   if (frame_count(map.frames) > size_t(kMostFrames))

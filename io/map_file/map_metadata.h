@@ -2,7 +2,10 @@
 
 #include <openvdb/MetaMap.h>
 
+#include <array>
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "mapping/map.h"
 
@@ -19,6 +22,9 @@ struct MapHeader {
   TouchJournal touches;  ///< without region masks
   std::map<std::string, std::string> metadata;
 };
+
+/// Frame numbers as a file states them, [first, step, count]: a recording that was fused whole is one triple.
+std::vector<std::array<int64_t, 3>> frame_runs(const std::vector<int64_t>& frames);
 
 openvdb::MetaMap to_metadata(const Map& map, const std::string& hash);
 

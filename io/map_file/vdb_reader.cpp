@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
+#include <sstream>
 #include <type_traits>
 
 #include "core/error.h"
@@ -17,7 +19,14 @@ namespace {
 
 constexpr int64_t kMagic = 0x56444220;
 constexpr uint32_t kFileVersion = 224;
-constexpr size_t kIdentifierBytes = 36, kTransformBytes = 15 * sizeof(double);
+constexpr size_t kIdentifierBytes = 36;
+
+std::string text_of(double number) {
+  std::ostringstream text;
+  text.precision(10);
+  text << number;
+  return text.str();
+}
 
 /// Bytes of a file one after the other, never beyond its end.
 class Bytes {
@@ -113,7 +122,7 @@ void read_grid_head(Bytes& in, VdbGridEntry& entry) {
   read_meta_map(in);
   if (const std::string map = in.text("transform of a grid"); map != "UniformScaleMap")
     in.fail("transform of a grid", "UniformScaleMap", map);
-  in.skip(kTransformBytes, "transform of a grid");
+  entry.transform = in.value<decltype(entry.transform)>("transform of a grid");
   entry.tree_at = in.at();
   if (end < 0 || uint64_t(end) < in.at() || uint64_t(end) - in.at() > in.left())
     in.fail("end of a grid", "a place behind its head", std::to_string(end));
@@ -317,8 +326,20 @@ const VdbGridEntry& VdbReader::grid(const std::string& name, const std::string& 
   return *found;
 }
 
+void VdbReader::require_voxel_size(double voxel_size_m) const {
+  const double s = voxel_size_m, expected[] = {s, s, 1 / s, 1 / (s * s), 0.5 / s};
+  for (const VdbGridEntry& entry : grids_)
+    for (size_t i = 0; i < entry.transform.size(); ++i) {
+      // What follows from the scale may have been rounded in another order.
+      const double number = expected[i / 3], found = entry.transform[i], most_off = i < 6 ? 0 : 1e-12 * number;
+      if (!(std::abs(found - number) <= most_off))
+        throw FormatError(describe_mismatch(where_ + ": grid '" + entry.name + "'", "transform",
+                                            text_of(number) + " for voxels of " + text_of(s) + " m", text_of(found)));
+    }
+}
+
 template <typename Value>
-void VdbReader::read(const std::string& name, const std::function<void(const VdbLeaf<Value>&)>& visit) const {
+Value VdbReader::read(const std::string& name, const std::function<void(const VdbLeaf<Value>&)>& visit) const {
   using Grid =
       std::conditional_t<std::is_same_v<Value, float>, openvdb::FloatGrid,
                          std::conditional_t<std::is_same_v<Value, int32_t>, openvdb::Int32Grid, openvdb::Vec3SGrid>>;
@@ -333,11 +354,13 @@ void VdbReader::read(const std::string& name, const std::function<void(const Vdb
     node.leaf(active, background, values.data());
     visit({coord, active, values.data()});
   }
+  return background;
 }
 
-template void VdbReader::read(const std::string&, const std::function<void(const VdbLeaf<float>&)>&) const;
-template void VdbReader::read(const std::string&, const std::function<void(const VdbLeaf<int32_t>&)>&) const;
-template void VdbReader::read(const std::string&, const std::function<void(const VdbLeaf<openvdb::Vec3s>&)>&) const;
+template float VdbReader::read(const std::string&, const std::function<void(const VdbLeaf<float>&)>&) const;
+template int32_t VdbReader::read(const std::string&, const std::function<void(const VdbLeaf<int32_t>&)>&) const;
+template openvdb::Vec3s VdbReader::read(const std::string&,
+                                        const std::function<void(const VdbLeaf<openvdb::Vec3s>&)>&) const;
 
 Region VdbReader::read_mask(const std::string& name) const {
   const VdbGridEntry& entry = grid(name, openvdb::MaskGrid::gridType());

@@ -3,6 +3,7 @@
 #include <openvdb/MetaMap.h>
 #include <openvdb/Types.h>
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -18,6 +19,8 @@ struct VdbGridEntry {
   std::string name, type;         ///< type as OpenVDB names it: "Tree_float_5_4_3"
   uint32_t compression = 0;       ///< openvdb::io's flags
   uint64_t tree_at = 0, end = 0;  ///< bytes of the file: where its tree begins, where the grid ends
+  /// Numbers of its UniformScaleMap, three of each: scale, edge of a voxel, 1 / scale, 1 / scale^2, 1 / (2 scale).
+  std::array<double, 15> transform{};
 };
 
 /// A leaf as the file holds it. `values`: 512, valid during the call.
@@ -39,14 +42,17 @@ public:
 
   /// Entries of type int32, double and string.
   const openvdb::MetaMap& metadata() const { return metadata_; }
+  const std::vector<VdbGridEntry>& grids() const { return grids_; }
   bool has(const std::string& name) const;
   /// The grid of that name. Throws where there is none, or one of another type.
   const VdbGridEntry& grid(const std::string& name, const std::string& type) const;
+  /// Throws unless every grid places its voxels by `index * voxel_size_m`.
+  void require_voxel_size(double voxel_size_m) const;
 
   /// Calls `visit` for each leaf of a grid of float, int32_t or openvdb::Vec3s, in the order of the file. No coordinate
-  /// comes twice.
+  /// comes twice. Returns the grid's background.
   template <typename Value>
-  void read(const std::string& name, const std::function<void(const VdbLeaf<Value>&)>& visit) const;
+  Value read(const std::string& name, const std::function<void(const VdbLeaf<Value>&)>& visit) const;
   /// Voxels of a mask grid.
   Region read_mask(const std::string& name) const;
 

@@ -7,10 +7,11 @@ namespace felt {
 namespace {
 
 Eigen::Vector3d center_m(const Map& map, const BlockCoord& coord, int offset) {
-  const Index3 first = first_voxel(coord), local = voxel_of_offset(offset);
-  return Eigen::Vector3d(first.x + local.x, first.y + local.y, first.z + local.z) * map.voxel_size_m;
+  const Index3 v = voxel_at(coord, offset);
+  return Eigen::Vector3d(v.x, v.y, v.z) * map.voxel_size_m;
 }
 
+/// The observed voxels, as block and offset, for which `inside` holds.
 template <typename Inside>
 Region observed_voxels(const Map& map, const Inside& inside) {
   Region region;
@@ -18,7 +19,7 @@ Region observed_voxels(const Map& map, const Inside& inside) {
     const Block& block = map.store[number];
     BlockMask mask;
     for (int i = 0; i < kBlockVoxels; ++i)
-      if (block.geometry->weight[i] > 0 && inside(block, i)) mask.set(i);
+      if (block.geometry->weight[i] > 0 && inside(VoxelRef{number, uint16_t(i)})) mask.set(i);
     if (mask.any()) region.append(block.coord, mask);
   }
   return region;
@@ -56,14 +57,14 @@ void copy_observed(const Block& from, const BlockMask& inside, BlockStore& store
 }  // namespace
 
 Region voxels_in(const Map& map, const Eigen::AlignedBox3d& box_m) {
-  return observed_voxels(map, [&](const Block& block, int i) { return box_m.contains(center_m(map, block.coord, i)); });
+  return observed_voxels(map, [&](const VoxelRef& voxel) {
+    return box_m.contains(center_m(map, map.store[voxel.block].coord, voxel.offset));
+  });
 }
 
 Region voxels_of_class(const Map& map, int slot) {
   const VoxelBeliefs beliefs(map);
-  return observed_voxels(map, [&](const Block& block, int i) {
-    return beliefs.strongest_class({map.store.find(block.coord), uint16_t(i)}) == slot;
-  });
+  return observed_voxels(map, [&](const VoxelRef& voxel) { return beliefs.strongest_class(voxel) == slot; });
 }
 
 Map cropped(const Map& map, const Region& region) {
@@ -90,8 +91,6 @@ Map cropped(const Map& map, const Region& region) {
   rebuild_touch_planes(result);
   return result;
 }
-
-Map cropped(const Map& map, const Eigen::AlignedBox3d& box_m) { return cropped(map, voxels_in(map, box_m)); }
 
 Eigen::AlignedBox3d observed_bounds(const Map& map) {
   Eigen::AlignedBox3d bounds;

@@ -15,7 +15,6 @@ Region voxels_of_class(const Map& map, int slot);
 /// A map of the observed voxels of a region: geometry, colour, class counts, tables, and the frames that they were
 /// made of, and what of the touches' regions lies in it. All others are unobserved in it.
 Map cropped(const Map& map, const Region& region);
-Map cropped(const Map& map, const Eigen::AlignedBox3d& box_m);
 
 /// Smallest box that holds the centres of all observed voxels, metres; empty for an empty map.
 Eigen::AlignedBox3d observed_bounds(const Map& map);

@@ -5,6 +5,9 @@
 #include <limits>
 #include <set>
 
+#include "mapping/maps/table_difference.h"
+#include "mapping/touch/touch_view.h"
+
 namespace felt {
 namespace {
 
@@ -47,18 +50,6 @@ const Block* observed_block(const Map& map, const BlockCoord& coord) {
   return block != nullptr && block->geometry->observed() ? block : nullptr;
 }
 
-/// Name of the class with the greatest evidence at a voxel, or nothing where no class has any.
-const std::string* leading_class(const Map& map, const Block& block, int i) {
-  float most = 0;
-  const std::string* name = nullptr;
-  for (const EvidencePlane& plane : block.evidence)
-    if (plane.counts->value[i] > most) {
-      most = plane.counts->value[i];
-      name = &map.classes.at_slot(plane.slot).name;
-    }
-  return name;
-}
-
 std::set<BlockCoord> observed_coordinates(const Map& a, const Map& b) {
   std::set<BlockCoord> coordinates;
   for (const Map* map : {&a, &b})
@@ -76,10 +67,11 @@ std::vector<std::string> different_settings(const Map& a, const Map& b) {
   compare("truncation_m", a.truncation_m, b.truncation_m);
   if (!(a.classes == b.classes))
     lines.push_back("class tables: " + std::to_string(a.classes.size()) + " and " + std::to_string(b.classes.size()) +
-                    " classes, not the same rows");
+                    " classes; " + first_difference(a.classes, b.classes));
   if (!(a.properties == b.properties))
     lines.push_back("property tables: " + std::to_string(a.properties.size()) + " and " +
-                    std::to_string(b.properties.size()) + " properties, not the same values");
+                    std::to_string(b.properties.size()) + " properties; " +
+                    first_difference(a.properties, b.properties));
   return lines;
 }
 
@@ -208,14 +200,44 @@ void compare_journals(const TouchJournal& a, const TouchJournal& b, MapDifferenc
   }
 }
 
-size_t flips(const Map& map_a, const Map& map_b, const Block* a, const Block* b) {
-  if (a == nullptr || b == nullptr || a->evidence.empty() || b->evidence.empty()) return 0;
+/// Labels of the voxels of a map, as in its grid `label`.
+class Labels {
+public:
+  explicit Labels(const Map& map) : map_(map) {
+    if (map.touches.any_active()) touched_ = touch_views(map);
+  }
+
+  bool any(const Block& block) const { return block.has_evidence() || view_of(touched_, block.coord) != nullptr; }
+  /// Slot of the class of a voxel, ClassTable::kNoSlot where it has none.
+  uint16_t slot(const Block& block, int i) const {
+    if (const TouchView* view = view_of(touched_, block.coord); view != nullptr && view->mask.test(i))
+      return uint16_t(view->label[size_t(i)]);
+    return class_belief(block, i, map_.classes, /*with_entropy=*/false).slot;
+  }
+  const std::string& name(uint16_t slot) const { return map_.classes.at_slot(slot).name; }
+
+private:
+  const Map& map_;
+  std::vector<TouchView> touched_;
+};
+
+size_t flips(const Labels& labels_a, const Labels& labels_b, const Block* a, const Block* b) {
+  if (a == nullptr || b == nullptr || !labels_a.any(*a) || !labels_b.any(*b)) return 0;
   size_t n = 0;
   for (int i = 0; i < kBlockVoxels; ++i) {
-    const std::string* class_a = leading_class(map_a, *a, i);
-    const std::string* class_b = leading_class(map_b, *b, i);
-    n += class_a != nullptr && class_b != nullptr && *class_a != *class_b;
+    const uint16_t slot_a = labels_a.slot(*a, i), slot_b = labels_b.slot(*b, i);
+    n += slot_a != ClassTable::kNoSlot && slot_b != ClassTable::kNoSlot &&
+         labels_a.name(slot_a) != labels_b.name(slot_b);
   }
+  return n;
+}
+
+/// Voxels that both maps label, as another class.
+size_t all_flips(const Map& a, const Map& b, const std::set<BlockCoord>& coordinates) {
+  const Labels labels_a(a), labels_b(b);
+  size_t n = 0;
+  for (const BlockCoord& coord : coordinates)
+    n += flips(labels_a, labels_b, observed_block(a, coord), observed_block(b, coord));
   return n;
 }
 
@@ -231,7 +253,8 @@ MapDifference difference(const Map& a, const Map& b) {
   if (!result.comparable) return result;
   result.same_hash = map_hash(a) == map_hash(b);
   Channels channels = make_channels(a, b);
-  for (const BlockCoord& coord : observed_coordinates(a, b)) {
+  const std::set<BlockCoord> coordinates = observed_coordinates(a, b);
+  for (const BlockCoord& coord : coordinates) {
     const Block* in_a = observed_block(a, coord);
     const Block* in_b = observed_block(b, coord);
     ++(in_a == nullptr ? result.blocks_only_b : in_b == nullptr ? result.blocks_only_a : result.blocks_both);
@@ -242,8 +265,10 @@ MapDifference difference(const Map& a, const Map& b) {
                    channels.even_evidence);
     compare_instances(in_a, in_b, channels);
     for (Channels::Touched& channel : channels.touched) compare_touched(in_a, in_b, channel);
-    result.class_flips += flips(a, b, in_a, in_b);
   }
+  // What touched voxels are believed to be takes a while: not where every value and every prior is the same.
+  if (!result.same_hash || !(a.classes == b.classes) || !(a.properties == b.properties))
+    result.class_flips = all_flips(a, b, coordinates);
   for (Accumulator* sums : {&channels.tsdf, &channels.weight, &channels.color, &channels.color_count})
     result.channels.push_back(sums->finish());
   for (Channels::Evidence& channel : channels.evidence) result.channels.push_back(channel.sums.finish());

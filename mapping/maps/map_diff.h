@@ -28,7 +28,7 @@ struct MapDifference {
   bool comparable = true;  ///< false where voxels do not coincide: another voxel size; then nothing else is compared
   size_t blocks_only_a = 0, blocks_only_b = 0, blocks_both = 0;
   std::vector<ChannelDifference> channels;
-  /// Voxels with evidence in both maps whose class of greatest evidence (the first of equals) has another name.
+  /// Voxels that both maps label (grid `label`: priors, evidence and touches) whose classes have different names.
   size_t class_flips = 0;
   /// Active touches, by id.
   size_t touches_only_a = 0, touches_only_b = 0, touches_both = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <map>
 #include <string>
 
@@ -15,10 +16,7 @@ class Faults {
 public:
   void add(const std::string& grid, const char* broken, const BlockCoord& block, int offset) {
     const auto [at, fresh] = index_.try_emplace({grid, broken}, faults_.size());
-    if (fresh) {
-      const Index3 base = first_voxel(block), in = voxel_of_offset(offset);
-      faults_.push_back({grid, broken, 0, {base.x + in.x, base.y + in.y, base.z + in.z}});
-    }
+    if (fresh) faults_.push_back({grid, broken, 0, voxel_at(block, offset)});
     ++faults_[at->second].voxels;
   }
   std::vector<MapFault> take() { return std::move(faults_); }
@@ -125,17 +123,20 @@ void verify_beliefs(const Map& map, Faults& faults) {
     for (size_t b = 0; b < group.region.blocks(); ++b)
       for_each_bit(group.region.mask[b], [&](int i) {
         const BlockCoord& coord = group.region.coord[b];
-        const Index3 first = first_voxel(coord), in = voxel_of_offset(i);
-        const Belief belief = beliefs.at({first.x + in.x, first.y + in.y, first.z + in.z});
-        for (const double alpha : belief.concentration)
-          if (!positive(alpha)) faults.add("alpha", "alpha is finite and > 0", coord, i);
-        for (size_t p = 0; p < belief.nig.size(); ++p)
-          for (const Nig& nig : belief.nig[p]) {
-            const std::string grid = "property/" + map.properties[int(p)].name;
-            if (nig.kappa == 0) continue;  // a class without a prior
-            if (!positive(nig.kappa) || !positive(nig.beta) || !positive(nig.gamma) || !std::isfinite(nig.tau))
-              faults.add(grid, "tau is finite, and kappa, beta and gamma are finite and > 0", coord, i);
-          }
+        try {
+          const Belief belief = beliefs.at(voxel_at(coord, i));
+          for (const double alpha : belief.concentration)
+            if (!positive(alpha)) faults.add("alpha", "alpha is finite and > 0", coord, i);
+          for (size_t p = 0; p < belief.nig.size(); ++p)
+            for (const Nig& nig : belief.nig[p]) {
+              const std::string grid = "property/" + map.properties[int(p)].name;
+              if (nig.kappa == 0) continue;  // a class without a prior
+              if (!positive(nig.kappa) || !positive(nig.beta) || !positive(nig.gamma) || !std::isfinite(nig.tau))
+                faults.add(grid, "tau is finite, and kappa, beta and gamma are finite and > 0", coord, i);
+            }
+        } catch (const std::exception&) {  // of evidence or readings that are broken themselves
+          faults.add("touched", "a belief follows from priors, evidence and touches", coord, i);
+        }
       });
 }
 

@@ -11,7 +11,7 @@ namespace felt {
 struct MapFault {
   std::string grid;    ///< where, by the name it has in a file: "tsdf", "evidence/<class>", ...
   std::string broken;  ///< the invariant, for example "weight is finite and >= 0"
-  size_t voxels = 0;   ///< how many voxels break it
+  size_t voxels = 0;   ///< how many voxels break it; 0 where it is not about voxels
   Index3 first;        ///< the first of them in ascending order of blocks
 };
 

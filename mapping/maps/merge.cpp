@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "mapping/fusion/tsdf_kernels.h"
+#include "mapping/maps/table_difference.h"
 #include "mapping/touch/touch_update.h"
 
 namespace felt {
@@ -20,16 +21,16 @@ const ClassTable& common_classes(std::span<const Map* const> maps) {
   return maps.front()->classes;
 }
 
-/// Property table of the result, likewise.
+/// Property table of the result: the longest, which continues those of all maps.
 const PropertyTable& common_properties(std::span<const Map* const> maps) {
-  for (const Map* map : maps)
-    if (!map->properties.empty()) return map->properties;
-  return maps.front()->properties;
+  const auto shorter = [](const Map* a, const Map* b) { return a->properties.size() < b->properties.size(); };
+  return (*std::max_element(maps.begin(), maps.end(), shorter))->properties;
 }
 
 void require_mergeable(std::span<const Map* const> maps, const MergeOptions& options) {
   std::vector<std::string> problems;
   const ClassTable& classes = common_classes(maps);
+  const PropertyTable& properties = common_properties(maps);
   for (size_t i = 0; i < maps.size(); ++i) {
     const std::string where = "map " + std::to_string(i + 1);
     if (maps[i]->voxel_size_m != maps[0]->voxel_size_m)
@@ -39,9 +40,12 @@ void require_mergeable(std::span<const Map* const> maps, const MergeOptions& opt
       problems.push_back(describe_mismatch(where, "truncation", in_millimetres(maps[0]->truncation_m),
                                            in_millimetres(maps[i]->truncation_m)));
     if (!maps[i]->classes.empty() && !(maps[i]->classes == classes))
-      problems.push_back(describe_mismatch(where, "class table", "the same in all maps", "another"));
-    if (!maps[i]->properties.empty() && !(maps[i]->properties == common_properties(maps)))
-      problems.push_back(describe_mismatch(where, "property table", "the same in all maps", "another"));
+      problems.push_back(describe_mismatch(where, "class table", "the same in all maps",
+                                           "another: " + first_difference(classes, maps[i]->classes)));
+    if (!continues(properties, maps[i]->properties))
+      problems.push_back(describe_mismatch(where, "property table",
+                                           "the same in all maps, or the beginning of a longer one",
+                                           "another: " + first_difference(properties, maps[i]->properties)));
     for (size_t j = 0; j < i && !options.allow_shared_frames; ++j)
       if (const auto shared = shared_frames(maps[j]->frames, maps[i]->frames); !shared.empty())
         problems.push_back(describe_mismatch(where, "frames", "none of those of map " + std::to_string(j + 1),

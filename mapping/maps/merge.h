@@ -19,9 +19,10 @@ struct MergeOptions {
 /// One map of what several maps of the same world frame observed: distances averaged by weight, colours by number of
 /// observations, weights and evidence added, journals of frames and touches joined. Equal to fusing all frames into one
 /// map: exactly where counts are added, within rounding where averages are, as long as no weight and no evidence
-/// reached its cap and nothing was carved. The result does not depend on the order of the arguments. Throws ConfigError
-/// naming every reason why the maps do not go together: voxel size, truncation, class table, property table, shared
-/// frames.
+/// reached its cap, nothing was carved, no evidence depends on earlier viewpoints, and all were fused with one weight
+/// and distance; instances keep the id with most of the parts' leads. The result does not depend on the order of the
+/// arguments. A property table may continue another: the result has the longest. Throws ConfigError naming every reason
+/// why the maps do not go together: voxel size, truncation, class table, property table, shared frames.
 Map merge(std::span<const Map* const> maps, const MergeOptions& options = {});
 
 }  // namespace felt

@@ -8,7 +8,6 @@
 #include "core/image.h"
 #include "mapping/map.h"
 #include "mapping/store/block_index.h"
-#include "mapping/surface/render.h"
 
 namespace felt {
 

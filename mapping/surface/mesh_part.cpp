@@ -22,6 +22,14 @@ std::vector<MeshScalars> chosen(const std::vector<MeshScalars>& all, const std::
   return some;
 }
 
+void copy_vertices(const TriangleMesh& from, const std::vector<uint32_t>& which, TriangleMesh& to) {
+  to.positions = chosen(from.positions, which);
+  to.normals = chosen(from.normals, which);
+  to.colors = chosen(from.colors, which);
+  to.labels = chosen(from.labels, which);
+  to.scalars = chosen(from.scalars, which);
+}
+
 }  // namespace
 
 TriangleMesh part_of(const TriangleMesh& mesh, const std::function<bool(const Triangle&)>& keep) {
@@ -43,13 +51,18 @@ TriangleMesh part_of(const TriangleMesh& mesh, const std::function<bool(const Tr
     part.triangles.push_back(renumbered);
     triangles.push_back(uint32_t(t));
   }
-  part.positions = chosen(mesh.positions, vertices);
-  part.normals = chosen(mesh.normals, vertices);
-  part.colors = chosen(mesh.colors, vertices);
-  part.labels = chosen(mesh.labels, vertices);
-  part.scalars = chosen(mesh.scalars, vertices);
+  copy_vertices(mesh, vertices, part);
   part.triangle_scalars = chosen(mesh.triangle_scalars, triangles);
   return part;
+}
+
+TriangleMesh points_of(const TriangleMesh& mesh, const std::function<bool(uint32_t)>& keep) {
+  std::vector<uint32_t> vertices;
+  for (uint32_t i = 0; i < mesh.positions.size(); ++i)
+    if (keep(i)) vertices.push_back(i);
+  TriangleMesh points;
+  copy_vertices(mesh, vertices, points);
+  return points;
 }
 
 }  // namespace felt

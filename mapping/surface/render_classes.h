@@ -3,7 +3,7 @@
 #include <cstddef>
 
 #include "core/image.h"
-#include "mapping/surface/render.h"
+#include "mapping/store/block_store.h"
 #include "mapping/touch/voxel_beliefs.h"
 
 namespace felt {
@@ -12,7 +12,7 @@ namespace felt {
 /// evidence nor a touch. Images of this header are computed in parallel.
 LabelImage class_image(const Map& map, const VoxelBeliefs& beliefs, const Image<VoxelRef>& voxels);
 
-/// Entropy of the class probabilities, nats; 0 where there is no surface.
+/// Entropy of the class probabilities, nats; NaN where there is no surface.
 Image<float> entropy_image(const VoxelBeliefs& beliefs, const Image<VoxelRef>& voxels);
 
 /// Mean and standard deviation of the next reading of a property, in its unit; NaN where there is no surface, no class
