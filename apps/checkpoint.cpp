@@ -59,11 +59,14 @@ json progress_of(const FusionRecord& record, const std::vector<Eigen::Isometry3d
 json text_of(const Map& map, const char* key, const std::string& where) {
   const auto found = map.metadata.find(key);
   const json text = found == map.metadata.end() ? json() : json::parse(found->second, nullptr, false);
-  if (!text.is_object())
-    throw FormatError(
-        describe_mismatch(where, std::string("text '") + key + "'", "that of a map of reconstruct",
-                          found == map.metadata.end() ? "none: not a map that can be continued" : "something else"));
-  return text;
+  if (text.is_object()) return text;
+  std::string instead = "something else";
+  if (map.metadata.contains(std::string(key) + " 1"))  // as merge numbers them
+    instead = "those of several runs: a merged map cannot be continued";
+  else if (found == map.metadata.end())
+    instead = "none: not a map that can be continued";
+  throw FormatError(
+      describe_mismatch(where, std::string("text '") + key + "'", "that of a map of reconstruct", instead));
 }
 
 void read_progress(const json& progress, const std::string& where, Checkpoint& checkpoint) {
@@ -87,7 +90,17 @@ void read_progress(const json& progress, const std::string& where, Checkpoint& c
   }
 }
 
-/// The path of a recording may be spelled in another way: its fingerprint is compared instead.
+void require_same_recording(const json& progress, const Map& map, const SequenceInfo& now, const std::string& where) {
+  if (progress.value("recording", json()) == now.content) return;
+  const bool same_beginning = !map.frames.runs.empty() && map.frames.runs.back().sequence == now.fingerprint;
+  throw ConfigError(describe_mismatch(
+      "--resume", "recording", "the one that " + where + " was made of",
+      same_beginning ? "that one, but it has grown or changed since (fuse its new frames with --frames into another "
+                       "folder and join both with feltmap merge, or begin again: --force instead of --resume)"
+                     : "another"));
+}
+
+/// The path of a recording may be spelled in another way: its content is compared instead.
 void require_same_run(const json& then, const json& now, const std::string& where) {
   std::set<std::string> keys;
   for (const json* config : {&then, &now})
@@ -120,14 +133,13 @@ std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vec
 
 void forget_progress(Map& map) { map.metadata.erase(kProgress); }
 
-std::optional<Checkpoint> resume(const std::filesystem::path& path, const std::string& recording,
+std::optional<Checkpoint> resume(const std::filesystem::path& path, const SequenceInfo& sequence,
                                  const nlohmann::ordered_json& config) {
   if (!std::filesystem::exists(path)) return std::nullopt;
   Map map = load_map(path);
   const std::string where = path.string();
   const json progress = text_of(map, kProgress, where);
-  if (progress.value("recording", json()) != recording)
-    throw ConfigError(describe_mismatch("--resume", "recording", "the one that " + where + " was made of", "another"));
+  require_same_recording(progress, map, sequence, where);
   require_same_run(text_of(map, kConfig, where), json::parse(json_text(config)), where);
   Checkpoint checkpoint{std::move(map), {}, {}, false, {}};
   read_progress(progress, where, checkpoint);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/reconstruct_report.h"
+#include "io/sequence/reader.h"
 #include "mapping/map.h"
 
 namespace felt::apps {
@@ -21,7 +22,7 @@ namespace felt::apps {
 std::string fusion_settings(const nlohmann::ordered_json& config);
 
 /// Writes the map with all that `resume` needs, and its views where the run ends. `recording`:
-/// SequenceInfo::fingerprint. `config`: settings as used. `viewpoints`: ViewNovelty::seen. `complete`: nothing is left
+/// SequenceInfo::content. `config`: settings as used. `viewpoints`: ViewNovelty::seen. `complete`: nothing is left
 /// to do for this map but to mesh it; its recorded touches are in it, and `touches` (JSON) says what became of each.
 /// Returns the map's hash.
 std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
@@ -40,9 +41,10 @@ struct Checkpoint {
   std::string touches;  ///< JSON of a complete run that had any, else empty
 };
 
-/// What `save_checkpoint` wrote; nothing where there is no such file. Throws ConfigError that names every setting that
-/// is another now, and FormatError where the file is no map of a reconstruction.
-std::optional<Checkpoint> resume(const std::filesystem::path& path, const std::string& recording,
+/// What `save_checkpoint` wrote; nothing where there is no such file. Throws ConfigError where the recording is
+/// another or has changed since, or naming every setting that is another now, and FormatError where the file is no map
+/// of one reconstruction.
+std::optional<Checkpoint> resume(const std::filesystem::path& path, const SequenceInfo& sequence,
                                  const nlohmann::ordered_json& config);
 
 }  // namespace felt::apps

@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include <thread>
 
@@ -60,8 +61,19 @@ CLI::App& add_command(CLI::App& app, const CommandText& text, CommonOptions& com
 
 CLI::Option* add_switch(CLI::App& command, const std::string& names, std::optional<bool>& value,
                         const std::string& text) {
-  return command.add_flag_function(
-      names, [&value](int64_t count) { value = count > 0; }, text);
+  // Checked before CLI11 converts it, which throws what is no usage error.
+  const auto is_switch = [](const std::string& word) {
+    try {
+      CLI::detail::to_flag_value(word);
+      return std::string();
+    } catch (const std::logic_error&) {
+      return "expected true or false, found '" + word + "'";
+    }
+  };
+  return command
+      .add_flag_function(
+          names, [&value](int64_t count) { value = count > 0; }, text)
+      ->check(is_switch);
 }
 
 void print_json(const nlohmann::ordered_json& document) { std::printf("%s\n", json_text(document, 2).c_str()); }

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -35,6 +36,24 @@ CLI::App& add_command(CLI::App& app, const CommandText& text, CommonOptions& com
 /// `names` as CLI11 takes them ("--x,!--no-x"); --x=false is false.
 CLI::Option* add_switch(CLI::App& command, const std::string& names, std::optional<bool>& value,
                         const std::string& text);
+
+/// An option that is given as one of `names`: help and errors list them. `value`: an Enum, or an optional of it.
+template <typename Enum, typename Value>
+CLI::Option* add_choice(CLI::App& command, const std::string& option, Value& value,
+                        const std::map<std::string, Enum>& names, const std::string& text) {
+  return command
+      .add_option_function<std::string>(
+          option, [&value, names](const std::string& name) { value = names.at(name); }, text)
+      ->check(CLI::IsMember(names));
+}
+
+/// The name of a choice.
+template <typename Enum>
+std::string name_of(const std::map<std::string, Enum>& names, Enum value) {
+  for (const auto& [name, candidate] : names)
+    if (candidate == value) return name;
+  return {};
+}
 
 /// A document on stdout, indented.
 void print_json(const nlohmann::ordered_json& document);

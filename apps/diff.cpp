@@ -37,7 +37,7 @@ void add_diff(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   CLI::App& command =
       add_command(app,
-                  {"diff", "Compare two maps grid by grid; exits 1 where they differ beyond the tolerance.",
+                  {"diff", "Compare two maps grid by grid; exits 1 where they differ beyond the tolerance",
                    "feltmap diff a/map.vdb b/map.vdb\nfeltmap diff a/map.vdb b/map.vdb --tol 1e-5 --json"},
                   options->common, [options] { return run(*options); });
   command.add_option("A", options->a, "Map file")->required();

@@ -24,6 +24,7 @@ Json to_json(const Examination& examination) {
   return {{"layout", examination.layout},
           {"faulty", examination.faulty()},
           {"frames", examination.recorded_frames},
+          {"selected_frames", examination.selected_frames},
           {"sampled_frames", examination.sampled_frames},
           {"frame_pairs", examination.frame_pairs},
           {"skipped", examination.skipped},
@@ -38,10 +39,14 @@ Json to_json(const Examination& examination) {
 }
 
 void print(const Examination& examination, bool quiet) {
-  if (!quiet)
-    std::printf("%s sequence of %lld frames; %lld frames and %lld pairs of them looked at\n",
-                examination.layout.c_str(), static_cast<long long>(examination.recorded_frames),
-                static_cast<long long>(examination.sampled_frames), static_cast<long long>(examination.frame_pairs));
+  if (!quiet) {
+    std::printf("%s sequence of %lld frames", examination.layout.c_str(),
+                static_cast<long long>(examination.recorded_frames));
+    if (examination.selected_frames != examination.recorded_frames)
+      std::printf(", of which %lld are selected", static_cast<long long>(examination.selected_frames));
+    std::printf("; %lld frames and %lld pairs of them looked at\n", static_cast<long long>(examination.sampled_frames),
+                static_cast<long long>(examination.frame_pairs));
+  }
   for (const Finding& finding : examination.findings) {
     if (quiet && !finding.faulty) continue;
     std::printf("%s %s: %s (%.0f %% sure)\n", finding.faulty ? "FAULT" : "   ok", finding.topic.c_str(),

@@ -37,7 +37,7 @@ struct EvaluateCommand {
   bool class_images = false;
   GeometryOptions geometry;
   ObservingCameras cameras;
-  CLI::Option *intrinsics = nullptr, *min_depth = nullptr, *max_depth = nullptr;
+  CLI::Option *intrinsics = nullptr, *size = nullptr, *min_depth = nullptr, *max_depth = nullptr;
 };
 
 /// What is evaluated: a map, or a mesh, or the map's mesh where geometry is asked for.
@@ -46,14 +46,20 @@ struct Evaluated {
   std::optional<TriangleMesh> mesh;
 };
 
-std::unique_ptr<SequenceReader> open_reference(const EvaluateCommand& command, const std::string& path) {
+/// How a sequence is read, be it for its labels or for its poses.
+SequenceOptions reading_of(const EvaluateCommand& command) {
   SequenceOptions options;
   options.read_color = options.read_instances = false;
   options.format = command.format;
-  options.labels_dir = command.labels;
-  options.classes_file = command.classes;
   if (command.intrinsics->count() > 0) options.intrinsics = parse_intrinsics(command.camera.intrinsics, "--intrinsics");
   if (!command.frames.empty()) options.frames = parse_frame_selection(command.frames, "--frames");
+  return options;
+}
+
+std::unique_ptr<SequenceReader> open_reference(const EvaluateCommand& command, const std::string& path) {
+  SequenceOptions options = reading_of(command);
+  options.labels_dir = command.labels;
+  options.classes_file = command.classes;
   return open_sequence(path, options);
 }
 
@@ -65,12 +71,7 @@ void read_cameras(EvaluateCommand& command) {
     cameras.T_world_camera = read_poses(command.trajectory);
     return;
   }
-  SequenceOptions options;
-  options.read_color = options.read_instances = false;
-  options.format = command.format;
-  if (command.intrinsics->count() > 0) options.intrinsics = parse_intrinsics(command.camera.intrinsics, "--intrinsics");
-  if (!command.frames.empty()) options.frames = parse_frame_selection(command.frames, "--frames");
-  const auto sequence = open_sequence(command.trajectory, options);
+  const auto sequence = open_sequence(command.trajectory, reading_of(command));
   cameras.camera = sequence->info().camera;
   for (int64_t i = 0; i < sequence->size(); ++i) {
     const ReadResult result = sequence->read(i);
@@ -162,6 +163,8 @@ LabelScores evaluate_mesh_labels(const EvaluateCommand& command, const Evaluated
 Json evaluate_readings(const EvaluateCommand& command, Map& map) {
   use_properties(map, command.properties);
   const VoxelBeliefs beliefs(map);
+  RegionSettings settings;
+  settings.min_weight = least_observed_weight(map);
   std::map<std::string, PropertyScores> scores;
   std::map<std::string, int64_t> refused;
   for (const RecordedTouch& reading : read_touches(command.reference_readings)) {
@@ -171,7 +174,7 @@ Json evaluate_readings(const EvaluateCommand& command, Map& map) {
       continue;
     }
     try {
-      const Index3 voxel = find_contact(map, *reading.point_m, {}).voxel;
+      const Index3 voxel = find_contact(map, *reading.point_m, settings).voxel;
       const StudentTMixture next =
           beliefs.next_reading({map.store.find(block_of_voxel(voxel)), uint16_t(offset_in_block(voxel))}, *property);
       if (next.weight.empty())
@@ -222,14 +225,15 @@ void check(const EvaluateCommand& c) {
   const auto need = [&](bool good, const char* option, const char* expected) {
     if (!good) problems.push_back(describe_mismatch("evaluate", option, expected, "none"));
   };
-  need(!c.reference_mesh.empty() || !c.reference_labels.empty() || !c.reference_readings.empty(), "reference",
-       "--reference-mesh, --reference-labels or --reference-readings");
+  if (c.reference_mesh.empty() && c.reference_labels.empty() && c.reference_readings.empty())
+    throw CLI::RequiredError("--reference-mesh, --reference-labels or --reference-readings");
   need(c.reliability.empty() || !c.reference_labels.empty() || !c.label_name.empty(), "--reliability",
        "--reference-labels, or --reference-mesh with --label-name");
   const bool of_sequence = !c.reference_labels.empty() || fs::is_directory(c.trajectory);
   need(c.frames.empty() || of_sequence, "--frames", "--reference-labels or --trajectory SEQUENCE");
   need(c.format.empty() || of_sequence, "--format", "--reference-labels or --trajectory SEQUENCE");
-  need(!fs::is_regular_file(c.trajectory) || c.intrinsics->count() > 0, "--trajectory FILE", "--intrinsics and --size");
+  need(!fs::is_regular_file(c.trajectory) || (c.intrinsics->count() > 0 && c.size->count() > 0), "--trajectory FILE",
+       "--intrinsics and --size");
   need(c.trajectory.empty() || !c.reference_mesh.empty(), "--trajectory", "--reference-mesh");
   need(c.properties.empty() || !c.reference_readings.empty(), "--properties", "--reference-readings");
   need(c.label_name.empty() || !c.reference_mesh.empty() || !c.reference_labels.empty(), "--label-name",
@@ -361,7 +365,10 @@ void add_evaluate(CLI::App& app) {
       ->needs("--trajectory")
       ->group(geometry);
   add_camera_options(sub, command.camera);
-  command.intrinsics = sub.get_option("--intrinsics");
+  // The defaults serve nothing here: a recording brings its camera, poses alone need the one they were taken with.
+  const std::string required = " (required where --trajectory is a file of poses)";
+  command.intrinsics = sub.get_option("--intrinsics")->default_str("")->description("fx,fy,cx,cy in pixels" + required);
+  command.size = sub.get_option("--size")->default_str("")->description("Width x height in pixels" + required);
   command.min_depth = sub.add_option("--min-depth", command.cameras.min_depth_m,
                                      "Metres, of the recording [as the map was fused, else 0.1]")
                           ->check(at_least_zero());

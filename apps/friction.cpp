@@ -77,6 +77,7 @@ int run_friction(const FrictionOptions& options) {
               normal_from.c_str());
   if (const double offset_n = reading.offset_n.norm(); offset_n >= 0.01)
     std::printf("the sensor reads %.2f N without contact: taken off all forces\n", offset_n);
+  if (options.at.empty()) std::printf("fill in x,y,z, the contact point in the map, or give --at\n");
   std::printf("%s", touches.c_str());
   return kDone;
 }
@@ -90,7 +91,7 @@ void add_friction(CLI::App& app) {
                                    "feltmap friction log.csv --normal 0,0,1 --plot log.svg\n"
                                    "feltmap friction log.csv --map map.vdb --at 0.4,1.2,0.0 --touch touches.csv"},
                                   *options, [options] { return run_friction(*options); });
-  command.add_option("log", options->log, "CSV with columns t, fx, fy, fz (seconds, newtons)")->required();
+  command.add_option("LOG", options->log, "CSV with columns t, fx, fy, fz (seconds, newtons)")->required();
   CLI::Option* normal =
       command.add_option("--normal", options->normal, "Surface normal in the frame of the forces: x,y,z")
           ->check(check_point);

@@ -30,6 +30,7 @@ struct InferOptions : CommonOptions {
   std::string simd;
   std::string plot;
   std::string fit_priors;
+  bool overwrite = false;  ///< of properties_out
   std::string properties_out, property = "friction", unit = "1";
   std::vector<double> support;  ///< of the property: lo, hi
   double max_nu_0 = kDefaultPriorReadings;
@@ -52,6 +53,7 @@ int run_fit(const InferOptions& options) {
 int run_infer(const InferOptions& options) {
   require_ending(options.plot, ".svg");
   require_ending(options.properties_out, ".yaml");
+  if (!options.properties_out.empty()) require_no_file(options.properties_out, options.overwrite);
   if (!options.simd.empty()) choose_simd(options.simd, "--simd");
   if (!options.fit_priors.empty()) return run_fit(options);
   std::ios::sync_with_stdio(false);
@@ -82,13 +84,10 @@ void add_infer(CLI::App& app) {
       {"infer", "Answer touch updates, one JSON document a line from stdin to stdout, without a map",
        R"(echo '{"prior": {"alpha": [1, 1], "tau": [0.39, 0.19], "kappa": [50, 50], "beta": [25, 25], "gamma": [0.126, 0.053]}, "rho": 0.5, "psi": [0.15]}' | feltmap infer)"},
       *options, [options] { return run_infer(*options); });
-  command
-      .add_option(
-          "--precision", options->precision,
-          "f64: the functions that specify the models; f32: the batch kernels, of which maps run those of mixture")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, InferPrecision>{{"f64", InferPrecision::f64}, {"f32", InferPrecision::f32}}))
-      ->default_str("f64");
+  const std::map<std::string, InferPrecision> precisions = {{"f64", InferPrecision::f64}, {"f32", InferPrecision::f32}};
+  add_choice(command, "--precision", options->precision, precisions,
+             "f64: the functions that specify the models; f32: the batch kernels, of which maps run those of mixture")
+      ->default_str(name_of(precisions, options->precision));
   CLI::Option* plot = command.add_option("--plot", options->plot,
                                          "Write an SVG with the density of the next reading, elsewhere in the class, "
                                          "before and after each of the first 20 "
@@ -111,6 +110,8 @@ void add_infer(CLI::App& app) {
                   "Least and largest value of the property in --properties-out: 0,inf for friction [all numbers]")
       ->delimiter(',')
       ->expected(2)
+      ->needs("--properties-out");
+  command.add_flag("--force", options->overwrite, "Replace --properties-out where it exists")
       ->needs("--properties-out");
   command.add_option("--max-nu", options->max_nu_0, "Most readings that a fitted prior may stand for")
       ->check(above_zero())

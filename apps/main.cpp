@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <memory>
 #include <new>
 #include <sstream>
 #include <string>
@@ -12,6 +13,7 @@
 #include "core/error.h"
 #include "core/simd.h"
 #include "io/files/system_memory.h"
+#include "io/settings/reconstruct_config.h"
 
 namespace felt::apps {
 namespace {
@@ -22,6 +24,15 @@ int fail(ExitCode code, const std::string& message) {
   for (std::string line; std::getline(lines, line);) std::fprintf(stderr, "feltmap: error: %s\n", line.c_str());
   return code;
 }
+
+/// CLI11's help, but for the lists of options that an option excludes: touch has 6 kB of them.
+class HelpFormatter final : public CLI::Formatter {
+public:
+  std::string make_option_opts(const CLI::Option* option) const override {
+    const std::string text = CLI::Formatter::make_option_opts(option);
+    return text.substr(0, text.find(" " + get_label("Excludes") + ":"));
+  }
+};
 
 void add_commands(CLI::App& app) {
   app.require_subcommand(1);
@@ -63,8 +74,33 @@ std::string option_without_value(int argc, char** argv) {
   return "";
 }
 
+/// Names of the command's options without dashes, those in groups of it too.
+std::vector<std::string> option_names(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options())
+    names.insert(names.end(), option->get_lnames().begin(), option->get_lnames().end());
+  for (const CLI::App* group : command.get_subcommands({})) {
+    if (!group->get_name().empty()) continue;
+    const std::vector<std::string> more = option_names(*group);
+    names.insert(names.end(), more.begin(), more.end());
+  }
+  return names;
+}
+
+/// What is wrong with the first option that the command does not have and that is nearly one of its own; empty where
+/// there is none.
+std::string misspelt_option(const CLI::App& command) {
+  for (const std::string& word : command.remaining(true)) {
+    if (!word.starts_with("--")) continue;
+    const std::string name = word.substr(2, word.find('=') - 2), near = nearest_word(name, option_names(command));
+    if (!near.empty()) return describe_mismatch(command.get_name(), "option", "'--" + near + "'", "'--" + name + "'");
+  }
+  return "";
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Dense volumetric mapping that knows what things are and how they feel", "feltmap");
+  app.formatter(std::make_shared<HelpFormatter>());
   add_commands(app);
   if (const std::string word = option_without_value(argc, argv); !word.empty())
     return fail(kUsage, "'" + word + "': expected a value, found none (see feltmap --help)");
@@ -84,7 +120,9 @@ int run(int argc, char** argv) {
         names.append(names.empty() ? "" : ", ").append(command->get_name());
       return fail(kUsage, "'" + unknown.front() + "': expected one of " + names + " (see feltmap --help)");
     }
-    return fail(kUsage, std::string(e.what()) + " (see feltmap --help)");
+    const CLI::App& command = app.get_subcommands().empty() ? app : *app.get_subcommands().front();
+    const std::string misspelt = misspelt_option(command);
+    return fail(kUsage, (misspelt.empty() ? e.what() : misspelt) + " (see feltmap --help)");
   }
 }
 

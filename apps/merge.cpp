@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -32,10 +33,7 @@ struct Options {
   bool overwrite = false;
 };
 
-bool has_evidence(const Map& map) {
-  return std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
-                     [](const Block& block) { return !block.evidence.empty() || block.even_evidence != nullptr; });
-}
+bool has_evidence(const Map& map) { return std::ranges::any_of(map.store.blocks(), &Block::has_evidence); }
 
 /// The cap that was given, else the one that all maps were made with which hold what it caps, else `usual`.
 float cap(const std::optional<float>& given, const std::vector<Map>& maps, const std::function<bool(const Map&)>& holds,
@@ -50,11 +48,43 @@ float cap(const std::optional<float>& given, const std::vector<Map>& maps, const
   return caps.empty() ? usual : float(*caps.begin());
 }
 
+/// Where the result is not what one run over all frames would give.
+void warn_of_what_does_not_add(const std::vector<Map>& maps, const MergeOptions& merging) {
+  if (maps.size() < 2) return;
+  if (any_run_with(maps, "carve"))
+    spdlog::warn("maps made with --carve: what one of them saw free does not erase what only another holds");
+  std::string different;
+  for (const char* key : {"distance", "weight", "dropoff_start_vox", "min_depth_m", "max_depth_m", "color_band_vox",
+                          "label_band_vox", "label_evidence"})
+    if (const std::set<std::string> values = values_of_runs(maps, key); values.size() > 1)
+      different +=
+          (different.empty() ? "" : "; ") + std::string(key) + ": " + *values.begin() + " and " + *values.rbegin();
+  if (!different.empty())
+    spdlog::warn("maps fused with different settings ({}): what is added up was not measured alike", different);
+  const auto any_above_zero = [&](const char* key) {
+    const std::set<double> numbers = numbers_of_runs(maps, key);
+    return !numbers.empty() && *numbers.rbegin() > 0;
+  };
+  if (std::any_of(maps.begin(), maps.end(), has_evidence) &&
+      (any_above_zero("label_novelty_m") || any_above_zero("label_turn_deg")))
+    spdlog::warn(
+        "maps made with --label-novelty or --label-turn: viewpoints that only another map saw count as new ones, so "
+        "that class evidence is more than that of one run");
+  for (size_t i = 0; i < maps.size() && !merging.allow_shared_frames; ++i)
+    for (size_t j = 0; j < i; ++j)
+      if (const size_t frames = frames_of_same_images(maps[j].frames, maps[i].frames); frames > 0)
+        spdlog::warn("maps {} and {} hold the same images with other poses or stamps: {} frames count twice", j + 1,
+                     i + 1, frames);
+}
+
 int run(const Options& options) {
   using Clock = std::chrono::steady_clock;
   const auto seconds = [](Clock::time_point a, Clock::time_point b) {
     return std::chrono::duration<double>(b - a).count();
   };
+  // From before it is read: a map may grow in place, and what others do to it meanwhile would be lost.
+  std::optional<MapWriting> writing;
+  if (std::filesystem::exists(options.out)) writing.emplace(options.out, options.overwrite);
   const auto start = Clock::now();
   std::vector<Map> maps;
   maps.reserve(options.maps.size());
@@ -67,11 +97,10 @@ int run(const Options& options) {
       merging.max_weight);
   merging.max_evidence = cap(options.max_evidence, maps, has_evidence, "label_cap", "cap of class evidence",
                              "--label-cap", merging.max_evidence);
-  if (maps.size() > 1 && any_run_with(maps, "carve"))
-    spdlog::warn("maps made with --carve: what one of them saw free does not erase what only another holds");
+  warn_of_what_does_not_add(maps, merging);
   const Map result = merge(pointers, merging);
-  const MapWriting writing(options.out);
-  require_nothing_lost(options.out, result, true, options.overwrite);
+  if (!writing) writing.emplace(options.out, options.overwrite);
+  require_nothing_lost(options.out, result, LostTouches::refuse, options.overwrite);
   const auto merged = Clock::now();
   const std::string hash = save_map(result, options.out);
   const auto saved = Clock::now();
@@ -98,13 +127,13 @@ void add_merge(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   CLI::App& command = add_command(
       app,
-      {"merge", "Join maps of the same world frame into one, as if all their frames had been fused together.",
+      {"merge", "Join maps of the same world frame into one, as if all their frames had been fused together",
        "feltmap merge monday/map.vdb tuesday/map.vdb --out both.vdb"},
       options->common, [options] { return run(*options); });
   command.add_option("MAPS", options->maps, "Map files")->required()->expected(1, -1);
   command.add_option("--out", options->out, "Map file to write")->required();
   command.add_flag("--force", options->overwrite,
-                   "Replace a map although it holds frames or touches that these do not");
+                   "Replace a map although it holds frames, voxels or touches that these do not");
   command.add_flag("--allow-shared-frames", options->merge.allow_shared_frames,
                    "Merge although the journals share frames, which then count twice");
   command

@@ -13,6 +13,8 @@
 #include "core/error.h"
 #include "io/files/atomic_file.h"
 #include "io/map_file/map_file.h"
+#include "mapping/grids/leaf_mask.h"
+#include "mapping/maps/table_difference.h"
 
 namespace felt::apps {
 namespace fs = std::filesystem;
@@ -27,19 +29,38 @@ size_t frames_missing_from(const FrameJournal& journal, const FusedFrames& run) 
   return missing.size();
 }
 
-/// What of an older map the new one does not hold, in words; empty where there is nothing.
-std::string missing_from(const Map& map, const MapJournals& older, bool touches_too) {
+BlockMask observed_voxels(const Block& block) {
+  return mask_where([weight = block.geometry->weight](int i) { return weight[i] > 0; });
+}
+
+/// Observed voxels of an older map that are not observed in the new one.
+size_t voxels_missing_from(const Map& map, const Map& older) {
+  size_t missing = 0;
+  for (const Block& block : older.store.blocks()) {
+    const Block* kept = map.store.get(block.coord);
+    missing += size_t((observed_voxels(block) - (kept ? observed_voxels(*kept) : BlockMask{})).count());
+  }
+  return missing;
+}
+
+/// Touches of an older map that count, and in the new one do not (`undone_too`) or are not known at all.
+size_t touches_missing_from(const TouchJournal& journal, const TouchJournal& older, bool undone_too) {
+  return size_t(std::count_if(older.touches.begin(), older.touches.end(), [&](const Touch& touch) {
+    const Touch* kept = journal.find(touch.id);
+    return !touch.undone && (kept == nullptr || (undone_too && kept->undone));
+  }));
+}
+
+/// What the journals of an older map say that the new one does not hold, in words; empty where there is nothing.
+std::string missing_from(const Map& map, const MapJournals& older, LostTouches touches) {
   if (older.voxel_size_m != map.voxel_size_m) return "a map of " + std::to_string(older.voxel_size_m) + " m voxels";
   if (!older.classes.empty() && !(older.classes == map.classes)) return "a map of other classes";
-  if (!older.properties.empty() && !(older.properties == map.properties)) return "a map of other properties";
+  if (!continues(map.properties, older.properties)) return "a map of other properties";
   if (older.frames.runs.empty() && !map.frames.runs.empty()) return "a map that does not say of what it was made";
   size_t lost_frames = 0;
   for (const FusedFrames& run : older.frames.runs) lost_frames += frames_missing_from(map.frames, run);
-  const auto lost_touches =
-      std::count_if(older.touches.touches.begin(), older.touches.touches.end(), [&](const Touch& touch) {
-        const Touch* kept = map.touches.find(touch.id);
-        return touches_too && !touch.undone && (kept == nullptr || kept->undone);
-      });
+  const size_t lost_touches =
+      touches == LostTouches::refuse ? touches_missing_from(map.touches, older.touches, true) : 0;
   if (lost_frames == 0 && lost_touches == 0) return "";
   return "a map with " + std::to_string(lost_frames) + " frames and " + std::to_string(lost_touches) +
          " touches that the new one does not hold";
@@ -47,7 +68,7 @@ std::string missing_from(const Map& map, const MapJournals& older, bool touches_
 
 }  // namespace
 
-void prepare_output_folder(const fs::path& folder, const std::vector<std::string>& names, bool overwrite) {
+void prepare_output_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (!fs::is_directory(folder))
@@ -56,6 +77,9 @@ void prepare_output_folder(const fs::path& folder, const std::vector<std::string
   if (access(folder.c_str(), W_OK | X_OK) != 0)
     throw IoError(
         describe_mismatch(folder.string(), "output folder", "a folder that can be written", std::strerror(errno)));
+}
+
+void require_no_files(const fs::path& folder, const std::vector<std::string>& names, bool overwrite) {
   std::string in_the_way;
   for (const std::string& name : names)
     if (fs::exists(folder / name)) in_the_way += (in_the_way.empty() ? "" : ", ") + name;
@@ -70,16 +94,32 @@ void require_no_file(const fs::path& file, bool overwrite) {
     throw IoError(describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", "one"));
 }
 
-void require_nothing_lost(const fs::path& file, const Map& replacement, bool touches_too, bool overwrite) {
+void require_writable(const fs::path& file, bool overwrite) {
+  if (!overwrite && fs::is_regular_file(file) && access(file.c_str(), W_OK) != 0)
+    throw IoError(describe_mismatch(file.string(), "output exists", "a file that may be written, or --force",
+                                    std::strerror(errno)));
+}
+
+void require_nothing_lost(const fs::path& file, const Map& replacement, LostTouches touches, bool overwrite) {
   if (overwrite || !fs::is_regular_file(file)) return;
   std::string lost;
+  size_t forgotten_touches = 0;
   try {
-    lost = missing_from(replacement, load_journals(file), touches_too);
+    const MapJournals older = load_journals(file);
+    lost = missing_from(replacement, older, touches);
+    forgotten_touches = touches_missing_from(replacement.touches, older.touches, false);
+    // A part that was cut out has the whole journal of frames.
+    if (lost.empty())
+      if (const size_t voxels = voxels_missing_from(replacement, load_map(file)); voxels > 0)
+        lost = "a map with " + std::to_string(voxels) + " observed voxels that the new one does not hold";
   } catch (const Error&) {
     lost = "a file that is no map that can be read";
   }
   if (!lost.empty())
     throw IoError(describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", lost));
+  if (forgotten_touches > 0)
+    spdlog::warn("{}: {} touches that count there are not in the map that replaces it", file.string(),
+                 forgotten_touches);
 }
 
 void require_ending(const fs::path& file, const std::string& ending) {
@@ -100,9 +140,10 @@ void warn_if_coarse(const TriangleMesh& mesh, const fs::path& file) {
         file.string(), farthest, step_m);
 }
 
-MapWriting::MapWriting(const fs::path& file)
+MapWriting::MapWriting(const fs::path& file, bool overwrite)
     : folder_(file.has_parent_path() ? file.parent_path() : fs::path("."), FileLock::Kind::shared, 1),
       file_(file, FileLock::Kind::exclusive, 60) {
+  require_writable(file, overwrite);
   remove_abandoned_parts(file);
 }
 

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "apps/command.h"
 #include "apps/number_checks.h"
 #include "io/files/content_hash.h"
 #include "io/files/text_input.h"
@@ -24,11 +25,9 @@ void PerceptionArguments::add_to(CLI::App& command, const char* group, const cha
       ->check(CLI::Range(0, 64))
       ->needs(network)
       ->group(group);
-  command
-      .add_option(
-          "--vote", vote,
-          "Give the pixels of a segment one class: geometric (from depth), instances (images or masks), or none")
-      ->transform(CLI::CheckedTransformer(kSources).description(""))
+  add_choice(command, "--vote", vote, kSources,
+             "Give the pixels of a segment one class: geometric (from depth), instances (images or masks), or none")
+      ->default_str(name_of(kSources, vote))
       ->group(group);
   command.add_option("--masks", instances, "Folder of instance images, or of a folder of masks for each frame")
       ->group(group);
@@ -58,8 +57,7 @@ nlohmann::ordered_json to_json(const PerceptionArguments& arguments) {
     json["segmenter_content"] = content_hash(read_whole_file(arguments.net));
   }
   json["top"] = arguments.top;
-  for (const auto& [name, source] : kSources)
-    if (source == arguments.vote) json["vote"] = name;
+  json["vote"] = name_of(kSources, arguments.vote);
   if (!arguments.instances.empty()) json["masks"] = arguments.instances.string();
   if (arguments.vote == SegmentSource::geometric) json["segment_color"] = arguments.color_step;
   return json;

@@ -43,12 +43,12 @@ json instance_json(const Block& block, int offset) {
 json geometry_json(const Map& map, const Eigen::Vector3d& point, bool instances, std::optional<Index3>& voxel) {
   json out;
   out["point_m"] = point_json(point);
-  const Eigen::Vector3d q = point / map.voxel_size_m;
-  if (!q.allFinite() || q.array().abs().maxCoeff() > 1e9) {
+  const std::optional<Index3> nearest = nearest_voxel(map, point);
+  if (!nearest) {
     out["reason"] = "not a point of a map";
     return out;
   }
-  const Index3 at{int32_t(std::lround(q.x())), int32_t(std::lround(q.y())), int32_t(std::lround(q.z()))};
+  const Index3 at = *nearest;
   const Block* block = map.store.get(block_of_voxel(at));
   const float weight = block == nullptr ? 0.0f : block->geometry->weight[offset_in_block(at)];
   out["voxel"] = {at.x, at.y, at.z};
@@ -149,7 +149,7 @@ void add_query(CLI::App& app) {
                                    "feltmap query map.vdb --at 0.4,1.2,0.0 --at 1,1,0 --below 0.25\n"
                                    "feltmap query map.vdb --file points.csv --json"},
                                   *options, [options] { return run_query(*options); });
-  command.add_option("map", options->map, "Map file")->required();
+  command.add_option("MAP", options->map, "Map file")->required();
   CLI::Option_group& where = *command.add_option_group("Where");
   where.require_option(1, 2);
   where.add_option("--at", options->at, "World point, metres: x,y,z; may be repeated")

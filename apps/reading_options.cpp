@@ -26,7 +26,11 @@ void add_reading_options(CLI::App& command, ReadingArguments& a) {
       .add_option("--body-camera", a.body_camera,
                   "Pose of the camera on the body whose poses are recorded: tx ty tz qx qy qz qw, or 12 or 16 numbers")
       ->group(reading);
-  command.add_option("--max-dt", a.max_dt_s, "Largest difference of stamps within a frame, seconds")->group(reading);
+  command
+      .add_option("--max-dt", a.max_dt_s,
+                  "Largest difference of stamps within a frame, seconds [" +
+                      CLI::detail::to_string(SequenceOptions{}.max_dt_s) + "]")
+      ->group(reading);
   command
       .add_option("--stamp-offset", a.stamp_offset, "Added to the stamps of poses: seconds, or frames where numbered")
       ->group(reading);
@@ -34,7 +38,7 @@ void add_reading_options(CLI::App& command, ReadingArguments& a) {
   command.add_option("--label-offset", a.label_offset, "Added to every label id")->group(reading);
   command
       .add_option("--probs", a.probs,
-                  "Folder of class probability images (docs/semantics.md), or of confidences beside --labels")
+                  "Folder of class probability images (docs/datasets.md#labels), or of confidences beside --labels")
       ->group(reading);
   command.add_option("--classes", a.classes, "Class table (classes.yaml, or a CSV of id and name)")->group(reading);
   add_switch(command, "--bgr", a.bgr, "Colour images hold red and blue exchanged")->group(reading);

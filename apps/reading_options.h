@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,8 +10,8 @@
 
 namespace felt::apps {
 
-/// How a sequence is to be read, in the command line's own words: shared by every command that opens one. What is left
-/// empty is found in the sequence or is the layout's default.
+/// How a sequence is to be read, in the command line's own words: shared by reconstruct, doctor, info and convert. What
+/// is left empty is found in the sequence or is the layout's default.
 struct ReadingArguments {
   std::string format, intrinsics, pose_convention, depth_encoding, frames;
   std::filesystem::path labels, probs, classes;

@@ -8,6 +8,7 @@
 #include <functional>
 #include <future>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <utility>
 
 #include "apps/checkpoint.h"
@@ -136,7 +137,8 @@ std::string nothing_fused(const FusionRecord& record) {
   return text;
 }
 
-/// Map file and mesh, side by side. The map is what cannot be made again: a mesh that fails does not stop its saving.
+/// Map file and mesh, made side by side. The map is what cannot be made again: a mesh that fails does not stop its
+/// saving, and is written behind it, so that it neither takes the room that the map needs nor lies beside another map.
 void write_results(const Map& map, const std::function<std::string()>& save, const fs::path& folder, int threads,
                    ReconstructReport& report) {
   auto saving = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&] {
@@ -144,22 +146,37 @@ void write_results(const Map& map, const std::function<std::string()>& save, con
     report.map_hash = save();
     report.save_s = seconds_since(start);
   });
+  if (threads <= 1) saving.wait();
+  TriangleMesh mesh;
   std::exception_ptr mesh_failure;
   try {
     const auto start = Clock::now();
     std::vector<VertexEdge> edges;
-    TriangleMesh mesh = extract_mesh(map, {}, &edges);
+    mesh = extract_mesh(map, {}, &edges);
     attach_beliefs(map, edges, mesh);
-    warn_if_coarse(mesh, folder / kMeshName);
-    write_ply(folder / kMeshName, mesh);
-    report.mesh_vertices = mesh.positions.size();
-    report.mesh_triangles = mesh.triangles.size();
     report.mesh_s = seconds_since(start);
   } catch (...) {
     mesh_failure = std::current_exception();
   }
   saving.get();
   if (mesh_failure) std::rethrow_exception(mesh_failure);
+  const auto start = Clock::now();
+  warn_if_coarse(mesh, folder / kMeshName);
+  try {
+    write_ply(folder / kMeshName, mesh);
+  } catch (const IoError& fault) {
+    throw IoError(std::string(fault.what()) + "; the map is saved: feltmap export --mesh makes the mesh of it");
+  }
+  report.mesh_vertices = mesh.positions.size();
+  report.mesh_triangles = mesh.triangles.size();
+  report.mesh_s += seconds_since(start);
+}
+
+/// Blocks that the map file holds: not those that were made for a frame and then not observed.
+size_t observed_blocks(const Map& map) {
+  const std::span<const Block> blocks = map.store.blocks();
+  return size_t(
+      std::count_if(blocks.begin(), blocks.end(), [](const Block& block) { return block.geometry->observed(); }));
 }
 
 /// What a run left out although it was asked for.
@@ -242,9 +259,11 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   const Perception perception = perception_of(options.perception, sequence->info().classes);
   const PreparedClasses classes = prepare_classes(options.labels, perception.classes(sequence->info()));
   const TouchPlan touches = plan_touches(options, *sequence, classes.table);
-  const bool goes_on = options.resume && fs::exists(options.out / kMapName);
-  prepare_output_folder(options.out, {kMapName, kMeshName, kReportName}, options.overwrite || goes_on);
+  prepare_output_folder(options.out);
   const FileLock writing(options.out, FileLock::Kind::exclusive, 1);
+  const bool goes_on = options.resume && fs::exists(options.out / kMapName);
+  require_no_files(options.out, {kMapName, kMeshName, kReportName}, options.overwrite || goes_on);
+  require_writable(options.out / kMapName, options.overwrite);
   check_memory(*sequence, options);
   for (const std::string& note : sequence->info().notes) spdlog::warn("{}", note);
   for (const Finding& fault : faults.get())
@@ -263,7 +282,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   bool complete = false;
   std::string touches_done;  // what became of the recorded touches, JSON; empty until they are applied
   if (options.resume)
-    if (auto earlier = resume(options.out / kMapName, source.recording, config)) {
+    if (auto earlier = resume(options.out / kMapName, sequence->info(), config)) {
       require_tables_of(earlier->map, classes.table, touches.properties, (options.out / kMapName).string());
       map = std::move(earlier->map);
       report.fusion = std::move(earlier->record);
@@ -273,11 +292,16 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
       touches_done = std::move(earlier->touches);
     }
   const auto save = [&] {
-    return save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, touches_done, source.recording,
-                           config, options.out / kMapName);
+    return save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, touches_done,
+                           sequence->info().content, config, options.out / kMapName);
   };
-  fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save, map, scratch,
-       report.fusion);
+  int64_t saved_after = report.resumed_after;  // frames of this run that map.vdb holds
+  const auto save_on_the_way = [&] {
+    save();
+    saved_after = report.fusion.read;
+  };
+  fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save_on_the_way, map,
+       scratch, report.fusion);
   // What lies there may be a good map: an empty one does not replace it.
   if (report.fusion.fused == 0 && !report.fusion.stopped.empty()) {
     std::fprintf(stderr, "feltmap: %s before anything was fused: nothing is saved\n", report.fusion.stopped.c_str());
@@ -296,9 +320,18 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
     complete = true;
     if (!touches.file.empty()) touches_done = json_text(touches_json(touches, touched));
   }
-  write_results(map, save, options.out, common.thread_count(), report);
+  const auto save_at_the_end = [&] {
+    try {
+      return save();
+    } catch (const IoError& fault) {
+      if (saved_after == 0 || !fs::exists(options.out / kMapName)) throw;
+      throw IoError(fault.what() + ("; the map there is that of the first " + std::to_string(saved_after)) +
+                    " frames, and --resume goes on from it");
+    }
+  };
+  write_results(map, save_at_the_end, options.out, common.thread_count(), report);
   report.voxel_size_m = options.voxel_size_m, report.truncation_m = options.truncation_m;
-  report.blocks = map.store.size();
+  report.blocks = observed_blocks(map);
   report.active_voxels = active_voxel_count(map);
   report.tsdf_bytes = map.store.geometry_bytes(), report.color_bytes = map.store.color_bytes();
   report.property_bytes = touch_plane_bytes(map) + journal_bytes(map.touches);
@@ -328,7 +361,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
                                        [](const TouchOutcome& outcome) { return outcome.effect.has_value(); });
     if (applied > 0) std::printf("  %td touches recorded with the sequence\n", applied);
   }
-  print_refused(touches, touched);
+  print_left_out(touches, touched);
   if (!touches.file.empty() && report.resumed_after > 0 && touched.empty() && touches_done.empty())
     spdlog::warn("{}: not applied, as the map was complete before: feltmap touch MAP --file does it",
                  touches.file.string());

@@ -14,22 +14,12 @@
 namespace felt::apps {
 namespace {
 
-template <typename Enum>
-using Names = std::map<std::string, Enum>;
-
-const Names<DistanceModel> kDistances = {{"optical-axis", DistanceModel::optical_axis},
-                                         {"ray", DistanceModel::ray},
-                                         {"tangent-plane", DistanceModel::tangent_plane}};
-const Names<WeightModel> kWeights = {{"constant", WeightModel::constant},
-                                     {"inverse-square", WeightModel::inverse_square},
-                                     {"sensor-noise", WeightModel::sensor_noise}};
-
-template <typename Enum>
-std::string name_of(const Names<Enum>& names, Enum value) {
-  for (const auto& [name, candidate] : names)
-    if (candidate == value) return name;
-  return {};
-}
+const std::map<std::string, DistanceModel> kDistances = {{"optical-axis", DistanceModel::optical_axis},
+                                                         {"ray", DistanceModel::ray},
+                                                         {"tangent-plane", DistanceModel::tangent_plane}};
+const std::map<std::string, WeightModel> kWeights = {{"constant", WeightModel::constant},
+                                                     {"inverse-square", WeightModel::inverse_square},
+                                                     {"sensor-noise", WeightModel::sensor_noise}};
 
 std::string text_of(double number) {
   std::ostringstream text;
@@ -101,13 +91,16 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
       ->group(map);
   command.add_option("--min-depth", a.min_depth_m, "Nearer depth is not used, metres [0.1]")->group(map);
   command.add_option("--max-depth", a.max_depth_m, "Farther depth is not used, metres [4]")->group(map);
-  command.add_option("--distance", a.distance, "Signed distance along: optical-axis, ray or tangent-plane")
-      ->transform(CLI::CheckedTransformer(kDistances).description(""))
+  const IntegrationConfig standard;
+  add_choice(command, "--distance", a.distance, kDistances,
+             "What signed distance is measured along [" + name_of(kDistances, standard.distance) + "]")
       ->group(map);
-  command.add_option("--weight", a.weight, "Weight of a measurement: constant, inverse-square or sensor-noise")
-      ->transform(CLI::CheckedTransformer(kWeights).description(""))
+  add_choice(command, "--weight", a.weight, kWeights,
+             "Weight of a measurement [" + name_of(kWeights, standard.weight) + "]")
       ->group(map);
-  command.add_option("--max-weight", a.max_weight, "Cap of a voxel's summed weight")->group(map);
+  command
+      .add_option("--max-weight", a.max_weight, "Cap of a voxel's summed weight [" + text_of(standard.max_weight) + "]")
+      ->group(map);
   add_switch(command, "--carve", a.carve, "Let free space seen later erase what stood there")->group(map);
 
   add_reading_options(command, a.reading);

@@ -39,6 +39,10 @@ bool any_prior(const PropertyTable& properties, const ClassTable& classes) {
                      [&](const Property& p) { return class_priors(p, classes).any(); });
 }
 
+int64_t already_counted(const std::vector<TouchOutcome>& outcomes) {
+  return std::count_if(outcomes.begin(), outcomes.end(), [](const TouchOutcome& o) { return o.already_counted; });
+}
+
 }  // namespace
 
 TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& selected, const ClassTable& classes) {
@@ -92,13 +96,16 @@ std::vector<TouchOutcome> apply_touches(Map& map, const TouchPlan& plan) {
   const TouchedSequence sequence = touched_sequence(*plan.sequence);
   TouchRequest defaults;
   defaults.region.min_weight = least_observed_weight(map);
-  return apply_recorded_touches(map, plan.touches, defaults, &sequence);
+  return apply_recorded_touches(map, plan.touches, defaults, &sequence, KnownReadings::leave_out);
 }
 
-void print_refused(const TouchPlan& plan, const std::vector<TouchOutcome>& outcomes) {
-  if (!plan.unused.empty()) spdlog::info("touches left out: {}", plan.unused);
+void print_left_out(const TouchPlan& plan, const std::vector<TouchOutcome>& outcomes) {
+  if (!plan.unused.empty()) spdlog::warn("touches left out: {}", plan.unused);
   for (const TouchOutcome& o : outcomes)
-    if (!o.effect) spdlog::warn("touch refused: {}:{}: {}", plan.file.string(), o.touch.line, o.refused);
+    if (!o.refused.empty()) spdlog::warn("touch refused: {}:{}: {}", plan.file.string(), o.touch.line, o.refused);
+  if (const int64_t counted = already_counted(outcomes); counted > 0)
+    spdlog::warn("{}: {} of {} touches count already (reading, place and time): left out", plan.file.string(), counted,
+                 outcomes.size());
 }
 
 nlohmann::ordered_json touches_json(const TouchPlan& plan, const std::vector<TouchOutcome>& outcomes) {
@@ -107,11 +114,12 @@ nlohmann::ordered_json touches_json(const TouchPlan& plan, const std::vector<Tou
   json["recorded"] = plan.recorded;
   json["applied"] =
       std::count_if(outcomes.begin(), outcomes.end(), [](const TouchOutcome& o) { return bool(o.effect); });
+  json["already_counted"] = already_counted(outcomes);
   json["outside_selection"] = plan.left_out;
   if (!plan.unused.empty()) json["unused"] = plan.unused;
   json["refused"] = nlohmann::ordered_json::array();
   for (const TouchOutcome& o : outcomes)
-    if (!o.effect) json["refused"].push_back({{"line", o.touch.line}, {"reason", o.refused}});
+    if (!o.refused.empty()) json["refused"].push_back({{"line", o.touch.line}, {"reason", o.refused}});
   json["ids"] = nlohmann::ordered_json::array();
   for (const TouchOutcome& o : outcomes)
     if (o.effect) json["ids"].push_back(id_text(o.effect->id));

@@ -27,13 +27,16 @@ struct TouchPlan {
 /// sequence merely carries is left unused where there is no property table or no class with a prior.
 TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& selected, const ClassTable& classes);
 
-/// Applies them to the finished map. A touch whose place cannot be touched leaves the map as it was.
+/// Applies them to the finished map. A touch whose place cannot be touched leaves the map as it was; one that counts in
+/// it already, since an interrupted run was touched by hand, is left out.
 std::vector<TouchOutcome> apply_touches(Map& map, const TouchPlan& plan);
 
-/// One line on stderr for every touch that was refused, and for all of them where they are unused.
-void print_refused(const TouchPlan& plan, const std::vector<TouchOutcome>& outcomes);
+/// One line on stderr for every touch that was refused, for those that counted already, and for all of them where they
+/// are unused.
+void print_left_out(const TouchPlan& plan, const std::vector<TouchOutcome>& outcomes);
 
-/// For the report: how many were recorded, applied and left out, and which were refused, with line and reason.
+/// For the report: how many were recorded, applied, counted already and left out, and which were refused, with line and
+/// reason.
 nlohmann::ordered_json touches_json(const TouchPlan& plan, const std::vector<TouchOutcome>& outcomes);
 
 }  // namespace felt::apps

@@ -66,7 +66,7 @@ void add_region(CLI::App& app) {
                                    "feltmap region map.vdb --at 0.4,1.2,0.0 --mesh floor.ply\nfeltmap region map.vdb "
                                    "--at 0.4,1.2,0.0 --below 0.25"},
                                   *options, [options] { return run_region(*options); });
-  command.add_option("map", options->map, "Map file")->required();
+  command.add_option("MAP", options->map, "Map file")->required();
   command.add_option("--at", options->at, "World point, metres: x,y,z")->check(check_point)->required();
   command.add_option("--mesh", options->mesh, "Write the region's surface (.ply, .obj, .glb)");
   command.add_option("--properties", options->properties,

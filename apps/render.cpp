@@ -138,26 +138,30 @@ nlohmann::ordered_json write_view(const RenderCommand& command, const Source& so
 }
 
 int render(const RenderCommand& command) {
+  const bool views = !command.poses.empty() || !command.trajectory.empty();
+  if (!views && command.overview.empty()) throw CLI::RequiredError("--pose, --trajectory or --overview");
+  if (views && command.out.empty()) throw CLI::RequiredError("--out");
+  std::vector<Eigen::Isometry3d> poses;
+  try {
+    for (const std::string& pose : command.poses) poses.push_back(parse_pose(pose, "--pose"));
+  } catch (const FormatError& fault) {
+    throw CLI::ValidationError(fault.what());
+  }
   const PinholeCamera camera = camera_of(command.camera);
   std::vector<std::string> problems;
-  std::vector<Eigen::Isometry3d> poses;
-  for (const std::string& pose : command.poses) poses.push_back(parse_pose(pose, "--pose"));
   if (!command.trajectory.empty())
     for (const auto& T : read_poses(command.trajectory)) poses.push_back(T);
-  if (poses.empty() && command.overview.empty())
-    problems.push_back(
-        describe_mismatch("render", "what to render", "--pose, --trajectory or --overview", "none of them"));
-  if (!poses.empty() && command.out.empty())
-    problems.push_back(describe_mismatch("render", "where to write", "--out DIR", "nothing"));
   Map map = load_map(command.map);
   use_properties(map, command.properties);
   const std::vector<TouchView> touched = touch_views(map);
   nlohmann::ordered_json levels = nlohmann::ordered_json::object();
+  bool any_to_color = false;
   for (const std::string& image : command.images) {
     const bool of_classes = image == "class" || image == "entropy";
     const auto property = property_image_of(map, touched, image);
     if (of_classes && map.classes.empty())
       problems.push_back(describe_mismatch(command.map, "--images class, entropy", "a map with classes", "none"));
+    any_to_color |= of_classes || property;
     if (property) levels[image] = {{"1", property->low}, {"65535", property->high}};
     if (!property && std::find(kImages.begin(), kImages.end(), image) == kImages.end()) {
       std::string known = "depth, normal, color, class, entropy";
@@ -166,8 +170,12 @@ int render(const RenderCommand& command) {
     }
   }
   if (!problems.empty()) throw ConfigError(problems);
+  if (command.colored && !any_to_color)
+    spdlog::warn("--colored: nothing to colour: only class, entropy and property images of --images are");
 
-  nlohmann::ordered_json json = {{"map", command.map}, {"views", nlohmann::ordered_json::array()}};
+  nlohmann::ordered_json json = {{"map", command.map}};
+  if (views) json["out"] = command.out;
+  json["views"] = nlohmann::ordered_json::array();
   if (!levels.empty()) json["levels"] = levels;
   if (!command.overview.empty()) {
     require_ending(command.overview, ".png");

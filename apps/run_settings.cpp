@@ -4,6 +4,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "io/files/json_text.h"
 #include "mapping/store/region_settings.h"
 
 namespace felt::apps {
@@ -24,6 +25,15 @@ std::set<double> numbers_of_runs(std::span<const Map> maps, const std::string& k
       if (const nlohmann::json settings = settings_of(run); settings.contains(key) && settings[key].is_number())
         numbers.insert(settings[key].get<double>());
   return numbers;
+}
+
+std::set<std::string> values_of_runs(std::span<const Map> maps, const std::string& key) {
+  std::set<std::string> values;
+  for (const Map& map : maps)
+    for (const FusedFrames& run : map.frames.runs)
+      if (const nlohmann::json settings = settings_of(run); settings.contains(key))
+        values.insert(json_text(settings[key]));
+  return values;
 }
 
 bool any_run_with(std::span<const Map> maps, const std::string& flag) {

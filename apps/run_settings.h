@@ -13,6 +13,9 @@ namespace felt::apps {
 /// Every number that runs have under this key.
 std::set<double> numbers_of_runs(std::span<const Map> maps, const std::string& key);
 
+/// Every value that runs have under this key, as JSON text.
+std::set<std::string> values_of_runs(std::span<const Map> maps, const std::string& key);
+
 /// Whether a run was made with this flag.
 bool any_run_with(std::span<const Map> maps, const std::string& flag);
 

@@ -43,10 +43,6 @@ struct SegmentRecord {
   bool interrupted = false;
 };
 
-void write_bytes_atomically(const fs::path& path, const std::vector<uint8_t>& bytes) {
-  write_file_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-}
-
 /// Files that one frame becomes.
 struct OutputNames {
   fs::path folder;
@@ -73,7 +69,7 @@ json state_of(const SegmentOptions& options, const ClassTable& classes) {
 /// Makes the output folder ready: a new one gets its state and class table, one of an earlier run with the same
 /// settings is gone on with, and any other is refused unless `overwrite`.
 void prepare(const SegmentOptions& options, const OutputNames& names, const ClassTable& classes) {
-  prepare_output_folder(options.out, {}, false);
+  prepare_output_folder(options.out);
   const fs::path file = options.out / kStateName;
   const std::string state = json_text(state_of(options, classes), 2) + "\n";
   if (fs::exists(file) && !options.overwrite) {
@@ -107,9 +103,9 @@ SegmentRecord segment_frames(const SequenceReader& sequence, const Perception& p
       ++record.skipped["no labels"];
     } else {
       const auto start = Clock::now();
-      write_bytes_atomically(names.of(frame.index), names.probabilities
-                                                        ? encode_probabilities(frame.probabilities)
-                                                        : encode_labels(frame.labels, sequence.info().classes));
+      write_file_atomically(names.of(frame.index), names.probabilities
+                                                       ? encode_probabilities(frame.probabilities)
+                                                       : encode_labels(frame.labels, sequence.info().classes));
       record.write_s += std::chrono::duration<double>(Clock::now() - start).count();
       ++record.written;
     }

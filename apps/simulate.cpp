@@ -147,7 +147,8 @@ void add_simulate(CLI::App& app) {
       app,
       {"simulate", "Write a sequence of an analytic scene: colour, depth, labels, poses, touches, and the truth",
        "feltmap simulate room1 --out room1 --noise rgbd --network medium --top 3\n"
-       "feltmap simulate ice_crossing --out ice --labels material --network ice_is_snow.csv --touches 3"},
+       "feltmap simulate ice_crossing --out ice --labels material --network data/confusion/ice_is_snow.csv --touches "
+       "3"},
       o.common, [] { return run_simulate(o); });
   command.add_option("SCENE", o.scene, "A built-in scene (--list) or a scene file (.yaml, .json; docs/datasets.md)");
   command.add_option("--out", o.out, "The folder to write");

@@ -77,7 +77,7 @@ void add_suggest(CLI::App& app) {
                                   {"suggest", "Rank the map's segments by what a touch would teach",
                                    "feltmap suggest map.vdb --property friction --top 5"},
                                   *options, [options] { return run_suggest(*options); });
-  command.add_option("map", options->map, "Map file")->required();
+  command.add_option("MAP", options->map, "Map file")->required();
   command.add_option("--property", options->property, "What would be measured")->required();
   command.add_option("--properties", options->properties,
                      "Property table (YAML), instead of the one that the map may have");

@@ -15,6 +15,7 @@
 #include "apps/number_checks.h"
 #include "apps/output_files.h"
 #include "apps/touch_options.h"
+#include "core/text.h"
 #include "inference/decision.h"
 #include "io/map_file/map_file.h"
 #include "io/readings/touch_json.h"
@@ -98,6 +99,7 @@ json effect_json(const Map& map, const TouchEffect& effect, const RegionSettings
   out["without_prior"] = classes_without_prior(map, effect);
   out["relabelled_voxels"] = effect.relabelled;
   out["refused_voxels"] = effect.refused;
+  out["surprise"] = effect.after.log_evidence[size_t(*map.properties.index_of(r.property))];
   out["tail_probability"] = effect.tail_probability;
   out["flags"] = {{"surprising", effect.flags.surprising},
                   {"multi_modal_before", effect.flags.multi_modal},
@@ -118,9 +120,9 @@ void print_effect(const Map& map, const TouchEffect& effect, const RegionSetting
     std::printf("  %llu voxels kept their state: no valid projection\n",
                 static_cast<unsigned long long>(effect.refused));
   for (const std::string& warning : region.warnings) std::printf("  warning: %s\n", warning.c_str());
-  for (const std::string& name : classes_without_prior(map, effect))
-    std::printf("  warning: %s has no prior of %s: the other classes share what was believed of it\n", name.c_str(),
-                touch.request.property.c_str());
+  if (const std::string silent = listed(classes_without_prior(map, effect)); !silent.empty())
+    std::printf("  warning: no prior of %s for %s: the other classes share what was believed of them\n",
+                touch.request.property.c_str(), silent.c_str());
   if (effect.flags.surprising) std::printf("  warning: no class explains this reading\n");
   if (effect.flags.not_one_material) std::printf("  warning: the region may hold more than one material\n");
   if (effect.modes.size() > 1) {
@@ -161,20 +163,15 @@ int list_touches(const TouchOptions& options) {
   return kDone;
 }
 
-/// How many of these touches, which are the journal's newest, repeat one that it had before: the same reading at the
-/// same place and time.
+/// How many of these touches, which are the journal's newest, repeat one that it had before.
 size_t repeated(const Map& map, const std::vector<TouchEffect>& effects) {
-  const auto same = [](const TouchRequest& a, const TouchRequest& b) {
-    return a.stamp_s == b.stamp_s && a.point_m == b.point_m && a.property == b.property && a.value == b.value &&
-           a.sigma == b.sigma;
-  };
   std::set<uint64_t> still_to_come;
   for (const TouchEffect& effect : effects) still_to_come.insert(effect.id);
   size_t count = 0;
   for (const TouchEffect& effect : effects) {
     const TouchRequest& request = map.touches.find(effect.id)->request;
     count += std::any_of(map.touches.touches.begin(), map.touches.touches.end(), [&](const Touch& other) {
-      return !still_to_come.contains(other.id) && !other.undone && same(other.request, request);
+      return !still_to_come.contains(other.id) && !other.undone && same_reading(other.request, request);
     });
     still_to_come.erase(effect.id);
   }
@@ -199,12 +196,13 @@ int run_touch(const TouchOptions& options) {
   if (options.list) return list_touches(options);
   const std::string& out_file = options.out.empty() ? options.map : options.out;
   std::optional<MapWriting> writing;
-  if (!options.dry_run) writing.emplace(out_file);
+  if (!options.dry_run) writing.emplace(out_file, options.force);
   Map map = load_map(options.map);
   use_properties(map, options.properties);
   const TouchRequest request = request_of(options, map);
   json out;
   out["map"] = options.map;
+  if (!options.dry_run) out["out"] = out_file;
   out["dry_run"] = options.dry_run;
   int code = kDone;
   std::string said;
@@ -242,7 +240,8 @@ int run_touch(const TouchOptions& options) {
     const std::optional<ViewMask> view = options.region.view();
     effects.push_back(apply_touch(map, resolve_touch(map, request, view ? &*view : nullptr)));
   }
-  if (!options.dry_run && !options.out.empty()) require_nothing_lost(options.out, map, false, options.force);
+  if (!options.dry_run && !options.out.empty())
+    require_nothing_lost(options.out, map, LostTouches::warn, options.force);
   out["map_hash"] = options.dry_run ? map_hash(map) : save_map(map, out_file);
   if (const size_t twice = repeated(map, effects); twice > 0)
     spdlog::warn("{} of {} touches repeat one that counts already (reading, place and time): they {} twice", twice,
@@ -276,7 +275,7 @@ void add_touch(CLI::App& app) {
                    "feltmap touch map.vdb --list\n"
                    "feltmap touch map.vdb --undo 3f0c5d8a91e2b764"},
                   *options, [options] { return run_touch(*options); });
-  command.add_option("map", options->map, "Map file")->required();
+  command.add_option("MAP", options->map, "Map file")->required();
   CLI::Option_group& what = *command.add_option_group("What to do");
   what.require_option(1);
   CLI::Option* at = what.add_option("--at", options->at, "World point of a reading, metres: x,y,z")->check(check_point);
@@ -316,8 +315,8 @@ void add_touch(CLI::App& app) {
   CLI::Option* properties = command.add_option("--properties", options->properties,
                                                "Property table (YAML), instead of the one that the map may have");
   CLI::Option* out = command.add_option("--out", options->out, "Write here instead of in place");
-  CLI::Option* force =
-      command.add_flag("--force", options->force, "Let --out replace a file that is no map of the same frames");
+  CLI::Option* force = command.add_flag("--force", options->force,
+                                        "Replace a file that is no map of the same frames, or was made read-only");
   CLI::Option* dry_run = command.add_flag("--dry-run", options->dry_run, "Say what would change and write nothing");
 
   at->needs(property)->needs(value)->excludes(sequence);

@@ -98,9 +98,9 @@ std::vector<CLI::Option*> RegionOptions::add_to(CLI::App& command) {
   add("--band", settings.band_voxels, "Half width of the surface band, voxels")
       ->check(above_zero_up_to(8))
       ->capture_default_str();
-  add("--min-weight", min_weight,
-      "Observation weight of an observed voxel [1; any, where the weight of frames depends on depth]")
-      ->check(above_zero());
+  min_weight = add("--min-weight", settings.min_weight,
+                   "Observation weight of an observed voxel [1; any, where the weight of frames depends on depth]")
+                   ->check(above_zero());
   add("--class-ratio", settings.class_ratio, "Least belief in the contact's class against the voxel's strongest")
       ->check(within(0, 1))
       ->capture_default_str();
@@ -114,14 +114,15 @@ std::vector<CLI::Option*> RegionOptions::add_to(CLI::App& command) {
   add("--mask", mask, "Image whose non-zero pixels belong to the region (with --region mask)");
   add("--intrinsics", intrinsics, "Camera of the mask: fx,fy,cx,cy or fx,fy,cx,cy,width,height")
       ->delimiter(',')
-      ->expected(4, 6);
+      ->expected(4, 6)
+      ->option_text("FLOAT x 4 or 6");
   add("--pose", pose, "Camera to world of the mask: 16 numbers row by row")->delimiter(',')->expected(16);
   return added;
 }
 
 RegionSettings RegionOptions::resolved(const Map& map) const {
   RegionSettings out = settings;
-  out.min_weight = min_weight ? *min_weight : least_observed_weight(map);
+  if (min_weight->count() == 0) out.min_weight = least_observed_weight(map);
   out.rule = rule_of_name(rule);
   if (out.rule == RegionRule::sphere && !std::isfinite(out.radius_m))
     throw ConfigError("--region sphere: expected --radius, found none");

@@ -19,8 +19,8 @@ Eigen::Vector3d point_of(const std::string& text);
 
 /// Options that say which voxels a touch speaks for, shared by `touch` and `region`.
 struct RegionOptions {
-  RegionSettings settings;
-  std::optional<double> min_weight;
+  RegionSettings settings;            ///< its `min_weight` counts where the option was given
+  CLI::Option* min_weight = nullptr;  ///< where it was not, the map's own weights decide
   std::string rule = "connected";
   std::string mask;                ///< picture of the rule `mask`
   std::vector<double> intrinsics;  ///< fx, fy, cx, cy

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <compare>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 
@@ -24,6 +25,11 @@ inline constexpr Index3 voxel_of_offset(int offset) { return {offset >> 6, (offs
 /// Arithmetic shift: floor division, right for negative indices.
 inline constexpr BlockCoord block_of_voxel(const Index3& v) { return {v.x >> 3, v.y >> 3, v.z >> 3}; }
 inline constexpr Index3 first_voxel(const BlockCoord& b) { return {b.x * 8, b.y * 8, b.z * 8}; }
+/// The voxel of a block at an offset.
+inline constexpr Index3 voxel_at(const BlockCoord& b, int offset) {
+  const Index3 first = first_voxel(b), in = voxel_of_offset(offset);
+  return {first.x + in.x, first.y + in.y, first.z + in.z};
+}
 inline constexpr int offset_in_block(const Index3& v) { return voxel_offset(v.x & 7, v.y & 7, v.z & 7); }
 
 }  // namespace felt

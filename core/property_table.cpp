@@ -2,30 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <set>
 #include <utility>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "core/utf8.h"
 
 namespace felt {
 namespace {
 
-std::string number(double x) {
-  char text[32];
-  snprintf(text, sizeof text, "%g", x);
-  return text;
-}
-
-}  // namespace
-
+/// Letters, digits, '_', '-' and '.': names become parts of grid names.
 bool valid_property_name(const std::string& name) {
   return !name.empty() && std::all_of(name.begin(), name.end(), [](unsigned char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
            c == '.';
   });
 }
+
+}  // namespace
 
 PropertyTable::PropertyTable(std::vector<Property> properties) : properties_(std::move(properties)) {
   std::vector<std::string> problems;
@@ -40,22 +35,22 @@ PropertyTable::PropertyTable(std::vector<Property> properties) : properties_(std
     expect(is_utf8(p.unit), where, "unit", "UTF-8", "other bytes");
     expect(names.insert(p.name).second, where, "name", "unique names", "it twice");
     expect(p.support_lo < p.support_hi, where, "support", "lo < hi",
-           number(p.support_lo) + " and " + number(p.support_hi));
-    expect(p.rho >= 0 && p.rho < 1, where, "rho", "0 <= rho < 1", number(p.rho));
+           number_text(p.support_lo) + " and " + number_text(p.support_hi));
+    expect(p.rho >= 0 && p.rho < 1, where, "rho", "0 <= rho < 1", number_text(p.rho));
     expect(std::isfinite(p.max_prior_readings) && p.max_prior_readings >= 1e-6, where, "max_prior_readings",
-           "a number of at least 1e-6", number(p.max_prior_readings));
+           "a number of at least 1e-6", number_text(p.max_prior_readings));
     for (const auto& [class_name, prior] : p.priors) {
       const std::string row = where + ", class '" + class_name + "'";
       expect(is_utf8(class_name), where, "names of classes", "UTF-8", "other bytes");
       // Squares of all of them, and their products, must be numbers.
       constexpr double kLargest = 1e15, kFewestReadings = 1e-6;
       expect(prior.mean >= p.support_lo && prior.mean <= p.support_hi, row, "mean", "a number in the support",
-             number(prior.mean));
-      expect(std::abs(prior.mean) <= kLargest, row, "mean", "a number of size up to 1e15", number(prior.mean));
+             number_text(prior.mean));
+      expect(std::abs(prior.mean) <= kLargest, row, "mean", "a number of size up to 1e15", number_text(prior.mean));
       expect(prior.sd >= 1 / kLargest && prior.sd <= kLargest, row, "sd", "a number from 1e-15 to 1e15",
-             number(prior.sd));
+             number_text(prior.sd));
       expect(std::isfinite(prior.readings) && prior.readings >= kFewestReadings, row, "readings",
-             "a number of at least 1e-6", number(prior.readings));
+             "a number of at least 1e-6", number_text(prior.readings));
     }
   }
   if (!problems.empty()) throw ConfigError(problems);

@@ -33,9 +33,6 @@ struct Property {
   bool operator==(const Property&) const = default;
 };
 
-/// Letters, digits, '_', '-' and '.': names become parts of grid names.
-bool valid_property_name(const std::string& name);
-
 /// The properties of a map, in the order of the file that named them.
 class PropertyTable {
 public:

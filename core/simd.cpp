@@ -8,6 +8,7 @@
 #include <cstdlib>
 
 #include "core/error.h"
+#include "core/text.h"
 
 namespace felt {
 namespace {
@@ -37,12 +38,6 @@ void disable(int64_t targets) {
   hwy::GetChosenTarget().DeInit();
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  std::string all;
-  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
-  return all;
-}
-
 }  // namespace
 
 std::vector<std::string> simd_names() {
@@ -60,7 +55,7 @@ void choose_simd(const std::string& name, const std::string& where) {
   if (name.empty()) return;
   const std::vector<std::string> names = simd_names();
   if (std::find(names.begin(), names.end(), name) == names.end())
-    throw ConfigError(describe_mismatch(where, "SIMD target", "one of " + joined(names), "'" + name + "'"));
+    throw ConfigError(describe_mismatch(where, "SIMD target", "one of " + listed(names), "'" + name + "'"));
   scalar_forced = name == "scalar";
   int64_t better = 0;
   for (const NamedTarget& named : kNamed) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -92,8 +93,8 @@ private:
   MaterialBatch batch_;
 };
 
-MaterialCounts view_of(const MaterialBatch& batch, double rho) {
-  MaterialCounts counts;
+BatchCounts view_of(const MaterialBatch& batch, double rho) {
+  BatchCounts counts;
   std::vector<uint32_t> voxels;
   for (size_t v = 0; v < batch.n; ++v) {
     if (batch.count[v] == 0) continue;
@@ -116,23 +117,19 @@ MaterialCounts view_of(const MaterialBatch& batch, double rho) {
   return counts;
 }
 
-MaterialCounts sum(const MaterialCounts& a, const MaterialCounts& b) {
-  return {a.updated + b.updated, a.refused + b.refused, a.computed + b.computed};
-}
-
 }  // namespace
 
-MaterialCounts material_view(std::span<const MaterialBatch> batches, double rho) noexcept {
+BatchCounts material_view(std::span<const MaterialBatch> batches, double rho) noexcept {
   return tbb::parallel_reduce(
-      tbb::blocked_range<size_t>(0, batches.size()), MaterialCounts{},
-      [&](const tbb::blocked_range<size_t>& range, MaterialCounts counts) {
-        for (size_t i = range.begin(); i < range.end(); ++i) counts = sum(counts, view_of(batches[i], rho));
+      tbb::blocked_range<size_t>(0, batches.size()), BatchCounts{},
+      [&](const tbb::blocked_range<size_t>& range, BatchCounts counts) {
+        for (size_t i = range.begin(); i < range.end(); ++i) counts = counts + view_of(batches[i], rho);
         return counts;
       },
-      sum);
+      std::plus<>());
 }
 
-MaterialCounts material_view(const MaterialBatch& batch, double rho) noexcept {
+BatchCounts material_view(const MaterialBatch& batch, double rho) noexcept {
   return material_view(std::span(&batch, 1), rho);
 }
 

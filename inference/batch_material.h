@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "inference/batch_counts.h"
 #include "inference/nig.h"
 
 namespace felt {
@@ -34,26 +35,19 @@ struct MaterialBatch {
   float* surprise = nullptr;  ///< ln sum_c pi(c) p(readings | c), written where given
 };
 
-struct MaterialCounts {
-  size_t updated = 0;
-  size_t refused = 0;   ///< covered voxels left alone: statistics, belief or A not finite, negative, or without mass
-  size_t computed = 0;  ///< distinct states computed
-  bool operator==(const MaterialCounts&) const = default;
-};
-
 /// Class posterior of the `material` model and its moment-matched view for every covered voxel, with correlation `rho`
 /// in [0, 1) between readings of one region: f32 on Highway vectors, once for each distinct (statistics, belief), so
 /// that a region under the same touches is one computation, whatever its size. Specified by `material_posterior` and
 /// `moment_matched_view` in f64, which "scalar" runs, and which compute states whose priors or beliefs f32 vectors
-/// cannot hold. Outputs do not depend on the number of threads, on the order of voxels or on which other voxels are in
-/// the batch.
+/// cannot hold. Refused are covered voxels whose statistics, belief or A are not finite, negative, or without mass.
+/// Outputs do not depend on the number of threads, on the order of voxels or on which other voxels are in the batch.
 ///
 /// Error against f64, relative (p absolute; tau to the larger of the class's sqrt(gamma/beta) and the way tau moved),
 /// with L the largest |log evidence| among the classes that matter: 1e-5 + 2e-6 L for p, tau, kappa, beta, gamma, and
 /// that times max(1, L) for the surprise. Never NaN; kappa and beta stay in [1e-15, 1e15], gamma in [1e-30, 1e30].
-MaterialCounts material_view(const MaterialBatch& batch, double rho) noexcept;
+BatchCounts material_view(const MaterialBatch& batch, double rho) noexcept;
 
 /// The same for many batches (the blocks of a region), one task each.
-MaterialCounts material_view(std::span<const MaterialBatch> batches, double rho) noexcept;
+BatchCounts material_view(std::span<const MaterialBatch> batches, double rho) noexcept;
 
 }  // namespace felt

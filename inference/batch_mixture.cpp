@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <vector>
 
@@ -97,7 +98,7 @@ void update_gathered(const MixtureBatch& batch, std::span<const uint32_t> first,
 }
 
 /// One task; `batch.updated` is given and zero.
-MixtureCounts update_task(const MixtureBatch& batch, const MixtureReading& reading, std::vector<float>& scratch) {
+BatchCounts update_task(const MixtureBatch& batch, const MixtureReading& reading, std::vector<float>& scratch) {
   std::vector<uint32_t> voxels;
   for (size_t v = 0; v < batch.n; ++v)
     if (batch.selected == nullptr || batch.selected[v] != 0) voxels.push_back(uint32_t(v));
@@ -107,7 +108,7 @@ MixtureCounts update_task(const MixtureBatch& batch, const MixtureReading& readi
   const std::vector<const float*> readable(planes.begin(), planes.end());
   // Gathering and scattering costs about a tenth of an update.
   DistinctStates distinct = distinct_states(readable, batch.n, voxels, voxels.size() * 3 / 4 + 1);
-  MixtureCounts counts;
+  BatchCounts counts;
   if (!distinct.first.empty()) {
     update_gathered(batch, distinct.first, voxels, distinct.state_of, reading, scratch);
     counts.computed = distinct.first.size();
@@ -142,7 +143,7 @@ struct Task {
   size_t begin, end;
 };
 
-MixtureCounts run(const Task& task, const MixtureReading& reading) {
+BatchCounts run(const Task& task, const MixtureReading& reading) {
   std::vector<MixturePlanes> classes;
   std::vector<float> scratch;
   MixtureBatch part = slice(*task.batch, task.begin, task.end, classes);
@@ -152,34 +153,30 @@ MixtureCounts run(const Task& task, const MixtureReading& reading) {
   const bool possible = std::isfinite(reading.psi) &&
                         std::any_of(classes.begin(), classes.end(), [](const auto& p) { return p.tau != nullptr; });
   if (possible) return update_task(part, reading, scratch);
-  MixtureCounts counts;
+  BatchCounts counts;
   for (size_t v = 0; v < part.n; ++v) counts.refused += part.selected == nullptr || part.selected[v] != 0;
   return counts;
 }
 
-MixtureCounts sum(MixtureCounts a, const MixtureCounts& b) {
-  return {a.updated + b.updated, a.refused + b.refused, a.computed + b.computed};
-}
-
 }  // namespace
 
-MixtureCounts update_mixture(std::span<const MixtureBatch> batches, double psi, double noise_sd,
-                             Projection projection) noexcept {
+BatchCounts update_mixture(std::span<const MixtureBatch> batches, double psi, double noise_sd,
+                           Projection projection) noexcept {
   const MixtureReading reading{psi, noise_sd, projection};
   std::vector<Task> tasks;
   for (const MixtureBatch& batch : batches)
     for (size_t begin = 0; begin < batch.n; begin += kTaskVoxels)
       tasks.push_back({&batch, begin, std::min(begin + kTaskVoxels, batch.n)});
   return tbb::parallel_reduce(
-      tbb::blocked_range<size_t>(0, tasks.size()), MixtureCounts{},
-      [&](const tbb::blocked_range<size_t>& range, MixtureCounts counts) {
-        for (size_t i = range.begin(); i < range.end(); ++i) counts = sum(counts, run(tasks[i], reading));
+      tbb::blocked_range<size_t>(0, tasks.size()), BatchCounts{},
+      [&](const tbb::blocked_range<size_t>& range, BatchCounts counts) {
+        for (size_t i = range.begin(); i < range.end(); ++i) counts = counts + run(tasks[i], reading);
         return counts;
       },
-      sum);
+      std::plus<>());
 }
 
-MixtureCounts update_mixture(const MixtureBatch& batch, double psi, double noise_sd, Projection projection) noexcept {
+BatchCounts update_mixture(const MixtureBatch& batch, double psi, double noise_sd, Projection projection) noexcept {
   return update_mixture(std::span(&batch, 1), psi, noise_sd, projection);
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "inference/batch_counts.h"
 #include "inference/projection.h"
 
 namespace felt {
@@ -31,13 +32,6 @@ struct MixtureBatch {
   uint8_t* updated = nullptr;         ///< 1 where the voxel was updated, 0 where left alone or refused; where given
 };
 
-struct MixtureCounts {
-  size_t updated = 0;
-  size_t refused = 0;   ///< selected voxels that keep their state: `published` gave no valid prior, or theirs was none
-  size_t computed = 0;  ///< distinct states computed
-  bool operator==(const MixtureCounts&) const = default;
-};
-
 /// One reading psi (noise of sd `noise_sd` >= 0, units of the property) applied in place to every selected voxel under
 /// the `mixture` model: responsibilities, NIG projection and Dirichlet projection (inference/mixture.h, mixture_update,
 /// is the f64 specification). Noise takes the tempered closed form; a voxel with a class for which that errs
@@ -58,11 +52,11 @@ struct MixtureCounts {
 /// rare (1e-3 beside 1e6) and little determines the sum: docs/batch_kernels.md has the formula. `published`: as `kl`
 /// where 1/kappa^ is no near-cancelling sum. The targets with fused multiply-add (avx2, avx3) give the same bits; sse4
 /// differs within the bound; "scalar" is f64 rounded once.
-MixtureCounts update_mixture(const MixtureBatch& batch, double psi, double noise_sd = 0,
-                             Projection projection = Projection::kl) noexcept;
+BatchCounts update_mixture(const MixtureBatch& batch, double psi, double noise_sd = 0,
+                           Projection projection = Projection::kl) noexcept;
 
 /// The same for many batches (the blocks of a region), one task each.
-MixtureCounts update_mixture(std::span<const MixtureBatch> batches, double psi, double noise_sd = 0,
-                             Projection projection = Projection::kl) noexcept;
+BatchCounts update_mixture(std::span<const MixtureBatch> batches, double psi, double noise_sd = 0,
+                           Projection projection = Projection::kl) noexcept;
 
 }  // namespace felt

@@ -1,12 +1,32 @@
 #include "inference/decision.h"
 
 #include <algorithm>
+#include <boost/math/quadrature/sinh_sinh.hpp>
 #include <cassert>
 #include <cmath>
 #include <limits>
 #include <numeric>
 
 namespace felt {
+namespace {
+
+/// P(|draw - location + N(0, noise_sd^2)| >= distance). A Student-t is a normal of variance scale2/u, u ~ Gamma(dof/2,
+/// dof/2), so the noise adds to the variance of each of these normals; what is left is an integral over ln u.
+double noisy_tail(const StudentT& t, double distance, double noise_sd) {
+  boost::math::quadrature::sinh_sinh<double> rule;
+  const double shape = t.dof / 2, width = 1 / std::sqrt(shape);
+  const auto over_precision = [&](auto f) {
+    return rule.integrate([&](double x) {
+      const double log_u = std::min(x * width, 300.0);  // beyond, u has no density left
+      return std::exp(shape * (log_u - std::expm1(log_u))) * f(std::exp(log_u));
+    });
+  };
+  const double mass = over_precision([](double) { return 1.0; });
+  const double noise2 = noise_sd * noise_sd;
+  return over_precision([&](double u) { return std::erfc(distance / std::sqrt(2 * (t.scale2 / u + noise2))); }) / mass;
+}
+
+}  // namespace
 
 double class_entropy(std::span<const double> p) {
   double sum = 0;
@@ -34,11 +54,14 @@ void apply_belief_floor(std::span<double> belief, double floor) {
   }
 }
 
-double tail_probability(const StudentTMixture& predictive, double psi) {
+double tail_probability(const StudentTMixture& predictive, double psi, double noise_sd) {
   double sum = 0;
   for (size_t c = 0; c < predictive.weight.size(); ++c) {
+    if (!(predictive.weight[c] > 0)) continue;
     const StudentT& t = predictive.component[c];
-    if (predictive.weight[c] > 0) sum += predictive.weight[c] * 2 * cdf(t, t.location - std::abs(psi - t.location));
+    const double distance = std::abs(psi - t.location);
+    const double tail = noise_sd > 0 ? noisy_tail(t, distance, noise_sd) : 2 * cdf(t, t.location - distance);
+    sum += predictive.weight[c] * tail;
   }
   return sum;
 }
@@ -88,9 +111,9 @@ std::vector<double> modes(const StudentTMixture& m, double least_height, double 
   return result;
 }
 
-RegionFlags region_flags(const StudentTMixture& predictive, double psi) {
+RegionFlags region_flags(const StudentTMixture& predictive, double psi, double noise_sd) {
   RegionFlags flags;
-  flags.surprising = tail_probability(predictive, psi) < kSurprising;
+  flags.surprising = tail_probability(predictive, psi, noise_sd) < kSurprising;
   flags.multi_modal = modes(predictive).size() > 1;
   flags.not_one_material = flags.surprising && class_entropy(predictive.weight) > kMixedEntropy;
   return flags;

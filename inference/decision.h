@@ -17,10 +17,10 @@ int most_probable_class(std::span<const double> p);
 /// for good. Needs floor k < 1. Default of the engine: 1e-6.
 void apply_belief_floor(std::span<double> belief, double floor);
 
-/// How well a predictive explains a reading: P(a draw lies at least as far from its own class's location, in scales of
-/// that class, as psi does), averaged over classes. 1 at the location of a lone class; small where no class explains
-/// psi.
-double tail_probability(const StudentTMixture& predictive, double psi);
+/// How well a predictive explains a reading psi = (draw) + N(0, noise_sd^2): P(a reading with such noise lies at least
+/// as far from its own class's location as psi does), averaged over classes. 1 at the location of a lone class; small
+/// where no class explains psi. Relative error with noise below 1e-8.
+double tail_probability(const StudentTMixture& predictive, double psi, double noise_sd);
 
 /// Local maxima of a mixture's density, ascending, that matter: higher than `least_height` of the highest, and with a
 /// dip to the next higher neighbour below `deepest_ridge` of their own height.
@@ -36,7 +36,8 @@ constexpr double kSurprising = 0.01;
 /// Class entropy (nats) from which a region counts as mixed: that of two classes at 0.9 and 0.1.
 constexpr double kMixedEntropy = 0.325;
 
-/// `predictive`: of the reading, before it was known; its weights are the class belief of the region.
-RegionFlags region_flags(const StudentTMixture& predictive, double psi);
+/// `predictive`: of the draw behind the reading, before it was known; its weights are the class belief of the region.
+/// `noise_sd`: of this reading.
+RegionFlags region_flags(const StudentTMixture& predictive, double psi, double noise_sd);
 
 }  // namespace felt

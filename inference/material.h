@@ -45,8 +45,8 @@ MaterialPosterior material_posterior(std::span<const double> vision_belief, std:
 
 /// A state of `mixture` form (Dirichlet times NIG blocks) that shows a `material` posterior to viewers and planners.
 struct MomentMatchedView {
-  std::vector<double>
-      a;                 ///< mean p(class), total `total_concentration` (a class of probability 0 gets the least float)
+  /// Mean p(class), total `total_concentration`; a class of probability 0 gets the least float.
+  std::vector<double> a;
   std::vector<Nig> nig;  ///< `kl` projection of p(c) NIG_n + (1 - p(c)) NIG
 };
 

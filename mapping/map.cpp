@@ -96,4 +96,10 @@ float sample_tsdf(const Map& map, double x, double y, double z, float min_weight
   return float(sum);
 }
 
+std::optional<Index3> nearest_voxel(const Map& map, const Eigen::Vector3d& point_m) {
+  const Eigen::Vector3d q = point_m / map.voxel_size_m;
+  if (!q.allFinite() || q.cwiseAbs().maxCoeff() > 1e9) return std::nullopt;
+  return Index3{int32_t(std::lround(q.x())), int32_t(std::lround(q.y())), int32_t(std::lround(q.z()))};
+}
+
 }  // namespace felt

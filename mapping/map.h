@@ -1,7 +1,10 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "core/class_table.h"
@@ -31,6 +34,10 @@ struct Map {
 /// Trilinear sample of the signed distance at a world point, metres; NaN where one of the eight voxels around it was
 /// never observed (weight < min_weight).
 float sample_tsdf(const Map& map, double x, double y, double z, float min_weight = 1e-6f);
+
+/// The voxel whose centre is nearest to a world point, observed or not; nothing where the point is no place of a map:
+/// not finite, or beyond 1e9 voxels from the origin.
+std::optional<Index3> nearest_voxel(const Map& map, const Eigen::Vector3d& point_m);
 
 /// Number of voxels with weight > 0.
 size_t active_voxel_count(const Map& map);

@@ -13,6 +13,7 @@
 #include "io/segmentation/segment_source.h"
 #include "io/segmentation/segmenter.h"
 #include "mapping/labels/segment_voting.h"
+#include "mapping/surface/render.h"
 #include "mapping/surface/render_classes.h"
 #include "mapping/touch/voxel_beliefs.h"
 

@@ -129,4 +129,8 @@ void write_file_atomically(const fs::path& destination, std::string_view bytes) 
   file.commit();
 }
 
+void write_file_atomically(const fs::path& destination, std::span<const uint8_t> bytes) {
+  write_file_atomically(destination, std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+}
+
 }  // namespace felt

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string_view>
 
 namespace felt {
@@ -43,5 +45,6 @@ void remove_abandoned_parts(const std::filesystem::path& destination);
 
 /// Replaces the content of `destination` by `bytes` in one step.
 void write_file_atomically(const std::filesystem::path& destination, std::string_view bytes);
+void write_file_atomically(const std::filesystem::path& destination, std::span<const uint8_t> bytes);
 
 }  // namespace felt

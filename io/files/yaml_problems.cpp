@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include "core/error.h"
+#include "core/text.h"
 
 namespace felt {
 namespace {
@@ -14,6 +15,10 @@ std::string content_of(const YAML::Node& node) {
 }
 
 }  // namespace
+
+std::string yaml_fault(const std::string& where, const YAML::Exception& fault, const std::string& what) {
+  return where + ":" + std::to_string(fault.mark.line + 1) + ": " + (what.empty() ? "" : what + ": ") + fault.msg;
+}
 
 std::string YamlProblems::place(const YAML::Node& node) const {
   return where_ + ":" + std::to_string(node ? node.Mark().line + 1 : table_line_);
@@ -30,16 +35,17 @@ void YamlProblems::problem(const YAML::Node& at, const std::string& what, const 
 
 void YamlProblems::refuse_unknown(const YAML::Node& table, const std::set<std::string>& known) {
   table_line_ = table.Mark().line + 1;
-  std::string names;
-  for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
+  for (const auto& entry : table)
+    if (!entry.first.IsScalar() || !known.contains(entry.first.Scalar()))
+      problem(entry.first, "key", "one of " + listed(known));
+  refuse_repeated(table);
+}
+
+void YamlProblems::refuse_repeated(const YAML::Node& table) {
   std::set<std::string> seen;
-  for (const auto& entry : table) {
-    const YAML::Node& key = entry.first;
-    if (!key.IsScalar() || !known.contains(key.Scalar()))
-      problem(key, "key", "one of " + names);
-    else if (!seen.insert(key.Scalar()).second)
-      problem(key, "key", "each once", "'" + key.Scalar() + "' again");
-  }
+  for (const auto& entry : table)
+    if (entry.first.IsScalar() && !seen.insert(entry.first.Scalar()).second)
+      problem(entry.first, "key", "each once", "'" + entry.first.Scalar() + "' again");
 }
 
 }  // namespace felt

@@ -5,10 +5,14 @@
 #include <vector>
 
 namespace YAML {
+class Exception;
 class Node;
-}
+}  // namespace YAML
 
 namespace felt {
+
+/// What cannot be parsed or converted: "<where>:<line>: <the parser's words>", with `what` before these where given.
+std::string yaml_fault(const std::string& where, const YAML::Exception& fault, const std::string& what = "");
 
 /// Gathers everything that is wrong with a YAML document, so that it can be said at once.
 class YamlProblems {
@@ -24,6 +28,8 @@ public:
   void problem(const YAML::Node& at, const std::string& what, const std::string& expected);
   /// Adds a problem for each key of a table that is not `known`, and for one that comes again.
   void refuse_unknown(const YAML::Node& table, const std::set<std::string>& known);
+  /// Adds a problem for each key that comes again: YAML keeps the first, and which one was meant nobody knows.
+  void refuse_repeated(const YAML::Node& table);
 
   std::vector<std::string> problems;
 

@@ -22,8 +22,6 @@ bool is_png(std::span<const uint8_t> file) {
 }
 bool is_jpeg(std::span<const uint8_t> file) { return file.size() >= 2 && file[0] == 0xff && file[1] == 0xd8; }
 
-uint32_t big_endian_32(const uint8_t* p) { return uint32_t(p[0]) << 24 | p[1] << 16 | p[2] << 8 | p[3]; }
-
 ImageError truncated(const std::string& where, std::span<const uint8_t> file) {
   return ImageError("truncated",
                     describe_mismatch(where, "image", "a whole image",

@@ -14,8 +14,6 @@ namespace {
 constexpr size_t kSignatureBytes = 8, kHeaderEnd = 33;  // signature and IHDR chunk
 constexpr size_t kInterlaceAt = 28;
 
-uint32_t big_endian_32(const uint8_t* p) { return uint32_t(p[0]) << 24 | p[1] << 16 | p[2] << 8 | p[3]; }
-
 ImageError unreadable(const std::string& where, const std::string& expected, const std::string& found) {
   return ImageError("unreadable", describe_mismatch(where, "PNG", expected, found));
 }

@@ -14,6 +14,9 @@ struct PngRows {
   size_t stride = 0;
 };
 
+/// The number in the four bytes at `p`, as PNG writes its own.
+inline uint32_t big_endian_32(const uint8_t* p) { return uint32_t(p[0]) << 24 | p[1] << 16 | p[2] << 8 | p[3]; }
+
 /// Inflates a zlib stream that holds exactly as many bytes as `out` takes. Throws ImageError ("truncated" where it
 /// holds fewer, "unreadable" where it is damaged or longer).
 void inflate_zlib(std::span<const uint8_t> packed, std::span<uint8_t> out, const std::string& where);

@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
+#include <cstdint>
 
 #include "core/error.h"
+#include "io/files/text_input.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -19,24 +18,12 @@ std::string lower_extension(const fs::path& path) {
   return extension;
 }
 
-std::string read_bytes(const fs::path& path) {
-  std::error_code error;
-  const auto status = fs::status(path, error);
-  if (error || !fs::is_regular_file(status))
-    throw IoError(describe_mismatch(path.string(), "mesh", "a file", fs::exists(status) ? "a folder" : "nothing"));
-  std::ifstream in(path, std::ios::binary);
-  std::string bytes(size_t(fs::file_size(path, error)), '\0');
-  if (!in.read(bytes.data(), std::streamsize(bytes.size())))
-    throw IoError(path.string() + ": cannot read: " + std::strerror(errno));
-  return bytes;
-}
-
 }  // namespace
 
 TriangleMesh read_mesh(const fs::path& path) {
   const std::string extension = lower_extension(path);
-  if (extension == ".ply") return parse_ply(read_bytes(path), path.string());
-  if (extension == ".obj") return parse_obj(read_bytes(path), path.string());
+  if (extension == ".ply") return parse_ply(read_whole_file(path, SIZE_MAX), path.string());
+  if (extension == ".obj") return parse_obj(read_whole_file(path, SIZE_MAX), path.string());
   throw FormatError(describe_mismatch(path.string(), "mesh", ".ply or .obj", "'" + extension + "'"));
 }
 

@@ -14,12 +14,6 @@ namespace felt {
 namespace fs = std::filesystem;
 namespace {
 
-void write_encoded(const fs::path& path, const std::vector<uint8_t>& png) {
-  AtomicFile file(path);
-  file.write(png.data(), png.size());
-  file.commit();
-}
-
 /// 0 at `low` to 1 at `high`, cut at both; 0 where both are the same.
 double share_of(double value, double low, double high) {
   return high > low ? std::clamp((value - low) / (high - low), 0.0, 1.0) : 0.0;
@@ -31,15 +25,17 @@ void paste(const ColorImage& panel, ColorImage& picture, int u0, int v0) {
 
 }  // namespace
 
-void write_png(const fs::path& path, const ColorImage& image) { write_encoded(path, encode_png(image)); }
+void write_png(const fs::path& path, const ColorImage& image) { write_file_atomically(path, encode_png(image)); }
 
 int64_t write_depth_png(const fs::path& path, const DepthImage& depth_m, double metres_per_step) {
   int64_t too_far = 0;
-  write_encoded(path, encode_png(stored_depth(depth_m, 1 / metres_per_step, too_far)));
+  write_file_atomically(path, encode_png(stored_depth(depth_m, 1 / metres_per_step, too_far)));
   return too_far;
 }
 
-void write_label_png(const fs::path& path, const LabelImage& labels) { write_encoded(path, encode_png(labels)); }
+void write_label_png(const fs::path& path, const LabelImage& labels) {
+  write_file_atomically(path, encode_png(labels));
+}
 
 void write_level_png(const fs::path& path, const Image<float>& values, double low, double high) {
   Image<uint16_t> levels(values.width(), values.height());
@@ -48,7 +44,7 @@ void write_level_png(const fs::path& path, const Image<float>& values, double lo
     levels.data()[i] =
         std::isfinite(value) ? uint16_t(std::lround(1 + 65534 * share_of(value, low, high))) : uint16_t(0);
   }
-  write_encoded(path, encode_png(levels));
+  write_file_atomically(path, encode_png(levels));
 }
 
 ColorImage colored(const Image<float>& values, double low, double high) {

@@ -70,23 +70,34 @@ public:
     return from_pixel_ + (scaled(value) - low_) / (high_ - low_) * (to_pixel_ - from_pixel_);
   }
   std::vector<double> ticks() const {
+    if (!log_) return even_ticks(low_, high_);
     std::vector<double> at;
-    if (log_) {
-      const double step = std::max(1.0, std::ceil((high_ - low_) / 8));
-      for (double decade = std::ceil(low_ - 1e-9); decade <= high_ + 1e-9; decade += step)
-        at.push_back(std::pow(10, decade));
-      return at;
+    if (high_ - low_ < 2) {
+      // Decades alone would be too few.
+      for (double decade = std::floor(low_); decade <= high_ + 1e-9; ++decade)
+        for (const double times : {1.0, 2.0, 5.0})
+          if (const double place = decade + std::log10(times); place >= low_ - 1e-9 && place <= high_ + 1e-9)
+            at.push_back(times * std::pow(10, decade));
+      return at.size() >= 2 ? at : even_ticks(std::pow(10, low_), std::pow(10, high_));
     }
-    const double rough = (high_ - low_) / 6, power = std::pow(10, std::floor(std::log10(rough)));
-    double step = 10 * power;
-    for (double candidate : {5.0, 2.0, 1.0})
-      if (candidate * power >= rough) step = candidate * power;
-    const double first = std::ceil(low_ / step - 1e-9);
-    for (int i = 0; i < 12 && (first + i) * step <= high_ + 1e-9 * step; ++i) at.push_back((first + i) * step);
+    const double step = std::ceil((high_ - low_) / 8);
+    for (double decade = std::ceil(low_ - 1e-9); decade <= high_ + 1e-9; decade += step)
+      at.push_back(std::pow(10, decade));
     return at;
   }
 
 private:
+  static std::vector<double> even_ticks(double low, double high) {
+    const double rough = (high - low) / 6, power = std::pow(10, std::floor(std::log10(rough)));
+    double step = 10 * power;
+    for (double candidate : {5.0, 2.0, 1.0})
+      if (candidate * power >= rough) step = candidate * power;
+    const double first = std::ceil(low / step - 1e-9);
+    std::vector<double> at;
+    for (int i = 0; i < 12 && (first + i) * step <= high + 1e-9 * step; ++i) at.push_back((first + i) * step);
+    return at;
+  }
+
   double scaled(double value) const { return log_ ? std::log10(value) : value; }
 
   bool log_;
@@ -208,9 +219,10 @@ std::string panel(const Plot& plot, double width, double height) {
   for (const PlotSeries& s : plot.series) out += drawn(s, x, y);
   out += legend(plot, right, top);
   out += text_at((left + right) / 2, 18, "middle", plot.title, " font-weight=\"bold\"");
-  out += text_at((left + right) / 2, height - 10, "middle", plot.x_label);
+  const auto axis_title = [](const std::string& label, bool log) { return log ? label + " (log)" : label; };
+  out += text_at((left + right) / 2, height - 10, "middle", axis_title(plot.x_label, plot.log_x));
   const std::string turn = fmt::format(" transform=\"rotate(-90 14 {:.1f})\"", (top + bottom) / 2);
-  out += text_at(14, (top + bottom) / 2, "middle", plot.y_label, turn.c_str());
+  out += text_at(14, (top + bottom) / 2, "middle", axis_title(plot.y_label, plot.log_y), turn.c_str());
   return out;
 }
 

@@ -26,7 +26,8 @@ struct Plot {
   std::string title, x_label, y_label;
   std::vector<PlotSeries> series;
   std::vector<PlotMarker> markers;
-  bool log_x = false, log_y = false;  ///< values that are not positive are left out of a logarithmic axis
+  /// Logarithmic axes, whose titles say so. Values that are not positive are left out.
+  bool log_x = false, log_y = false;
 };
 
 /// Text of an SVG picture with the panels in rows of `columns`, each `panel_width` x `panel_height` pixels.

@@ -90,7 +90,7 @@ MaterialView material_view_f32(const InferRequest& in) {
     classes[c] = {in.prior[c], in.prior[c].tau, &belief[c], &a[c], b, b + 1, b + 2, b + 3};
   }
   float surprise = 0;
-  const MaterialCounts counts =
+  const BatchCounts counts =
       material_view({1, &n, &mean, &m2, readings.mean, &concentration, classes, &surprise}, in.rho);
   if (counts.updated != 1) throw FormatError("psi: expected readings that single precision can hold, found none");
   MaterialView out{widened(a), double(surprise), {widened(a), nigs_of(blocks, in.prior)}};

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
-#include <iterator>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -18,8 +17,8 @@ namespace {
 
 /// 255 where any channel of the image is not zero.
 Image<uint8_t> set_pixels(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  const std::vector<uint8_t> bytes((std::istreambuf_iterator<char>(stream)), {});
+  const std::string content = read_whole_file(file);
+  const std::span<const uint8_t> bytes(reinterpret_cast<const uint8_t*>(content.data()), content.size());
   const ImageHeader header = read_image_header(bytes, file.string());
   Image<uint8_t> set(header.width, header.height);
   if (header.format == ImageFormat::png && header.channels == 1) {
@@ -36,8 +35,6 @@ Image<uint8_t> set_pixels(const std::filesystem::path& file) {
 
 ViewMask read_view_mask(const std::filesystem::path& file, const std::vector<double>& intrinsics,
                         const std::vector<double>& pose) {
-  if (!std::filesystem::is_regular_file(file))
-    throw IoError(describe_mismatch(file.string(), "mask", "a readable image", "none"));
   const Image<uint8_t> image = set_pixels(file);
   const auto size_text = [](double w, double h) {
     char text[64];

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "mapping/regions/region_query.h"
+#include "mapping/regions/view_mask.h"
 
 namespace felt {
 

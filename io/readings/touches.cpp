@@ -52,7 +52,13 @@ RecordedTouch parse_row(const std::vector<std::string>& cells, const Columns& co
     if (!touch.frame)
       problems.push_back(describe_mismatch(where, "frame", "a frame number", "'" + cells[columns["frame"]] + "'"));
   }
-  if (columns.has("x") && columns.has("y") && columns.has("z"))
+  const auto all = [&](const std::vector<const char*>& names, auto good) {
+    return std::all_of(names.begin(), names.end(), good);
+  };
+  const auto named = [&](const char* name) { return columns.has(name); };
+  const auto blank = [&](const char* name) { return cells[columns[name]].empty(); };
+  const bool points = all({"x", "y", "z"}, named), pixels = all({"u", "v"}, named);
+  if (points && !(pixels && all({"x", "y", "z"}, blank)))
     touch.point_m = Eigen::Vector3d(real("x"), real("y"), real("z"));
   else
     touch.pixel = Eigen::Vector2d(real("u"), real("v"));
@@ -204,17 +210,34 @@ double stamp_of(const RecordedTouch& touch, const TouchedSequence& sequence) {
   return touch.stamp_s ? *touch.stamp_s : sequence.frames[place].stamp_s;
 }
 
+bool same_reading(const TouchRequest& a, const TouchRequest& b) {
+  return a.stamp_s == b.stamp_s && a.point_m == b.point_m && a.property == b.property && a.value == b.value &&
+         a.sigma == b.sigma;
+}
+
 std::vector<TouchOutcome> apply_recorded_touches(Map& map, const std::vector<RecordedTouch>& touches,
-                                                 const TouchRequest& defaults, const TouchedSequence* sequence) {
+                                                 const TouchRequest& defaults, const TouchedSequence* sequence,
+                                                 KnownReadings known) {
   std::vector<TouchOutcome> outcomes;
+  std::vector<TouchRequest> counted;  // before, and not yet found among the rows
+  if (known == KnownReadings::leave_out)
+    for (const Touch& touch : map.touches.touches)
+      if (!touch.undone) counted.push_back(touch.request);
   const FusedSpan span = fused_span(map.frames);
   TouchBatch batch(map);
   for (const RecordedTouch& touch : touches) {
-    TouchOutcome outcome{touch, std::nullopt, ""};
+    TouchOutcome outcome{touch, std::nullopt, "", false};
     try {
       if (sequence == nullptr) require_recorded_within(span, touch);
       const Resolved asked = resolved(touch, defaults, sequence);
-      outcome.effect = batch.apply(resolve_touch(map, asked.request, asked.view ? &*asked.view : nullptr));
+      const auto before = std::find_if(counted.begin(), counted.end(), [&](const TouchRequest& request) {
+        return same_reading(request, asked.request);
+      });
+      outcome.already_counted = before != counted.end();
+      if (outcome.already_counted)
+        counted.erase(before);
+      else
+        outcome.effect = batch.apply(resolve_touch(map, asked.request, asked.view ? &*asked.view : nullptr));
     } catch (const Error& error) {
       outcome.refused = error.what();
     }

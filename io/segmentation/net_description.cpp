@@ -165,7 +165,7 @@ NetDescription read_net_description(const fs::path& path) {
     read_mapping(root, net, reader);
     if (root["otherwise"]) net.otherwise = reader.text(root, "otherwise", kNoClassName);
   } catch (const YAML::Exception& fault) {
-    reader.problems.push_back(path.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
+    reader.problems.push_back(yaml_fault(path.string(), fault));
   }
   if (!reader.problems.empty()) throw ConfigError(reader.problems);
   return net;

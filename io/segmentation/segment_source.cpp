@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "mapping/store/region_settings.h"
+
 namespace felt {
 
 Image<uint16_t> segments_of(const Frame& frame, SegmentSource source, const FrameSegmentSettings& settings) {

@@ -4,7 +4,7 @@
 
 #include "core/frame.h"
 #include "mapping/labels/frame_segments.h"
-#include "mapping/regions/region_query.h"
+#include "mapping/regions/view_mask.h"
 
 namespace felt {
 

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "io/files/text_input.h"
+#include "io/files/yaml_problems.h"
 #include "io/images/image_decode.h"
 
 namespace felt {
@@ -50,7 +51,7 @@ CameraFile read_structured(const fs::path& path, const std::string& content) {
                                               path.string());
     }
   } catch (const YAML::Exception& fault) {
-    throw FormatError(path.string() + ":" + std::to_string(fault.mark.line + 1) + ": camera: " + fault.msg);
+    throw FormatError(yaml_fault(path.string(), fault, "camera"));
   }
   return file;
 }
@@ -99,18 +100,22 @@ CameraFile read_camera_file(const fs::path& path) {
   return {intrinsics_of_numbers(numbers, path.string())};
 }
 
-void check_camera_fits_image(const PinholeCamera& camera, const std::string& where) {
+void check_camera_fits_image(const PinholeCamera& camera, const std::string& where, const std::string& lacking_file) {
   const auto angle_deg = [](double focal, int pixels) {
     return 2 * std::atan(pixels / (2 * focal)) * 180 / 3.14159265358979;
   };
   const double across = angle_deg(camera.fx, camera.width), down = angle_deg(camera.fy, camera.height);
   const bool inside = camera.cx > 0 && camera.cx < camera.width && camera.cy > 0 && camera.cy < camera.height;
   if (inside && across > 5 && across < 170 && down > 5 && down < 170) return;
+  const std::string found = lacking_file.empty()
+                                ? "fx " + std::to_string(camera.fx) + ", fy " + std::to_string(camera.fy) + ", cx " +
+                                      std::to_string(camera.cx) + ", cy " + std::to_string(camera.cy)
+                                : "the layout's default " +
+                                      to_string(Intrinsics{camera.fx, camera.fy, camera.cx, camera.cy}) +
+                                      "; give --intrinsics fx,fy,cx,cy or a " + lacking_file;
   throw FormatError(describe_mismatch(
       where, "intrinsics",
-      "a camera of " + std::to_string(camera.width) + " x " + std::to_string(camera.height) + " images",
-      "fx " + std::to_string(camera.fx) + ", fy " + std::to_string(camera.fy) + ", cx " + std::to_string(camera.cx) +
-          ", cy " + std::to_string(camera.cy)));
+      "a camera of " + std::to_string(camera.width) + " x " + std::to_string(camera.height) + " images", found));
 }
 
 }  // namespace felt

@@ -28,6 +28,8 @@ std::string negative_focal_hint(double fy);
 
 /// Throws FormatError where no lens of an RGB-D sensor gives such a camera: a principal point outside the image, or an
 /// angle of view across the image below 5 or above 170 degrees. Catches calibrations of another camera or image size.
-void check_camera_fits_image(const PinholeCamera& camera, const std::string& where);
+/// `lacking_file`: of a sequence's listing, for the remedy.
+void check_camera_fits_image(const PinholeCamera& camera, const std::string& where,
+                             const std::string& lacking_file = "");
 
 }  // namespace felt

@@ -128,15 +128,10 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   info_.touches_file = listing_.touches_file;
   info_.recorded_frames = int64_t(listing_.frames.size());
   info_.fingerprint = fingerprint(listing_);
+  info_.content = frames_content(listing_);
   find_camera(path);
 
-  std::vector<FrameRecord> selected;
-  for (const int64_t i : selected_positions(options.frames, info_.recorded_frames))
-    selected.push_back(std::move(listing_.frames[size_t(i)]));
-  listing_.frames = std::move(selected);
-  if (listing_.frames.empty())
-    throw ConfigError(describe_mismatch("frames " + to_string(options.frames), "selection",
-                                        "some of the " + std::to_string(info_.recorded_frames) + " frames", "none"));
+  select_frames(options.frames, listing_);
   const auto any = [&](auto test) { return std::any_of(listing_.frames.begin(), listing_.frames.end(), test); };
   bgr_ = options.bgr;
   label_offset_ = options.label_offset;
@@ -189,7 +184,7 @@ void ListedSequence::find_camera(const fs::path& path) {
                                         size_text(width, height) + " in the first depth image"));
   const Intrinsics k = listing_.intrinsics.value_or(Intrinsics{});
   info_.camera = {k.fx, k.fy, k.cx, k.cy, width, height};
-  check_camera_fits_image(info_.camera, path.string());
+  check_camera_fits_image(info_.camera, path.string(), listing_.lacking_camera_file);
 }
 
 void ListedSequence::check_color_camera(const fs::path& path) const {
@@ -438,6 +433,17 @@ ProbabilityImage ListedSequence::read_class_maps(const FrameRecord& frame) const
 }
 
 }  // namespace
+
+void select_frames(const FrameSelection& selection, SequenceListing& listing) {
+  const int64_t recorded = int64_t(listing.frames.size());
+  std::vector<FrameRecord> selected;
+  for (const int64_t i : selected_positions(selection, recorded))
+    selected.push_back(std::move(listing.frames[size_t(i)]));
+  listing.frames = std::move(selected);
+  if (listing.frames.empty())
+    throw ConfigError(describe_mismatch("frames " + to_string(selection), "selection",
+                                        "some of the " + std::to_string(recorded) + " frames", "none"));
+}
 
 std::unique_ptr<SequenceReader> make_listed_sequence(const fs::path& path, const SequenceOptions& options,
                                                      SequenceListing listing) {

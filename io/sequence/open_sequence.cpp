@@ -21,7 +21,10 @@ namespace felt {
 namespace fs = std::filesystem;
 namespace {
 
-const Layout& layout_named(const std::string& name) {
+/// The layout that `path` is to be read as. ScanNet is distributed as containers and as folders exported from them.
+const Layout& layout_named(const std::string& name, const fs::path& path) {
+  if (name == "scannet" && !kScanNetLayout.recognises(path) && kSensLayout.recognises(path)) return kSensLayout;
+  if (name == "open3d") return kRedwoodLayout;
   std::string names;
   for (const Layout& layout : all_layouts()) {
     if (name == layout.name) return layout;
@@ -73,7 +76,7 @@ SequenceListing list_as_recorded(const fs::path& given, const SequenceOptions& o
     fs::directory_iterator(path, fault);
     if (fault) throw IoError(describe_mismatch(path.string(), "sequence", "a readable folder", fault.message()));
   }
-  const Layout& layout = options.format.empty() ? detect_layout(path) : layout_named(options.format);
+  const Layout& layout = options.format.empty() ? detect_layout(path) : layout_named(options.format, path);
   SequenceListing listing = layout.list(path, options);
   listing.layout = layout.name;
   if (listing.frames.empty())

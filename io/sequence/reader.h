@@ -39,7 +39,10 @@ struct SequenceInfo {
   ClassTable classes;                                   ///< empty where the sequence brings none
   std::filesystem::path properties_file, touches_file;  ///< that the sequence carries; empty where it has none
   int64_t recorded_frames = 0;                          ///< before the selection of frames
-  std::string fingerprint;                   ///< of the recording, wherever it lies and whatever of it is selected
+  /// Which recording it is (io/sequence/sequence_fingerprint.h), wherever it lies and whatever of it is selected, also
+  /// after it grew.
+  std::string fingerprint;
+  std::string content;                       ///< of all its frames: another one after it grew or changed
   double voxel_size_m = 0, max_depth_m = 0;  ///< what suits the sensor; 0: nothing else than usual
   std::vector<std::string> notes;            ///< what was assumed or repaired, one sentence each
 };

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "core/class_table.h"
@@ -22,6 +23,14 @@ struct ImageSource {
   int face = 0;  ///< of a scan (io/sequence/lidar_scan.h)
   bool empty() const { return path.empty(); }
 };
+
+/// Bytes that an image takes where it lies; 0 where there is no such image.
+inline uint64_t stored_bytes(const ImageSource& source) {
+  if (source.empty() || source.bytes > 0) return source.bytes;
+  std::error_code fault;
+  const uintmax_t bytes = std::filesystem::file_size(source.path, fault);
+  return fault ? 0 : bytes;
+}
 
 /// A probability image of one class, or one detection of it: values times `score`.
 struct ClassMap {
@@ -47,9 +56,10 @@ struct FrameRecord {
 /// A sequence as plain data: what every layout produces and one reader decodes.
 struct SequenceListing {
   std::string layout;
-  std::vector<FrameRecord> frames;             ///< in recorded order
-  std::optional<Intrinsics> intrinsics;        ///< of the depth images
-  int width = 0, height = 0;                   ///< of the depth images; 0: from the first one that can be read
+  std::vector<FrameRecord> frames;       ///< in recorded order
+  std::optional<Intrinsics> intrinsics;  ///< of the depth images
+  std::string lacking_camera_file;       ///< without it `intrinsics` are the layout's default; empty: they are not
+  int width = 0, height = 0;             ///< of the depth images; 0: from the first one that can be read
   std::optional<Intrinsics> color_intrinsics;  ///< where colour is not on the depth images' grid
   int color_width = 0, color_height = 0;       ///< of that camera's images; 0: not stated
   Distortion distortion, color_distortion;     ///< of each camera's lens

@@ -1,5 +1,7 @@
 #include "io/sequence/sequence_options.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <vector>
 
@@ -47,6 +49,8 @@ DepthEncoding parse_depth_encoding(const std::string& text, const std::string& w
   if (text == "rotated3") return DepthEncoding::rotated3;
   throw ConfigError(describe_mismatch(where, "depth encoding", "plain or rotated3", "'" + text + "'"));
 }
+
+std::string to_string(const Intrinsics& k) { return fmt::format("{:g}, {:g}, {:g}, {:g}", k.fx, k.fy, k.cx, k.cy); }
 
 Intrinsics parse_intrinsics(const std::string& text, const std::string& where) {
   std::vector<double> numbers;

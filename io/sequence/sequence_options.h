@@ -36,6 +36,9 @@ struct Intrinsics {
   double fx = 0, fy = 0, cx = 0, cy = 0;
 };
 
+/// "fx, fy, cx, cy"
+std::string to_string(const Intrinsics& intrinsics);
+
 /// Reads "fx,fy,cx,cy". Throws ConfigError where a number is missing, not finite or a focal length is not positive.
 Intrinsics parse_intrinsics(const std::string& text, const std::string& where);
 

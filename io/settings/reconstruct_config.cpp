@@ -258,7 +258,7 @@ ReconstructConfig read_reconstruct_config(const fs::path& path) {
       }
     }
   } catch (const YAML::Exception& fault) {
-    found.problems.push_back(path.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
+    found.problems.push_back(yaml_fault(path.string(), fault));
   }
   if (!found.problems.empty()) throw ConfigError(found.problems);
   return config;

@@ -30,7 +30,7 @@ public:
     try {
       document = YAML::Load(text);
     } catch (const YAML::Exception& e) {
-      throw ConfigError(where + ":" + std::to_string(e.mark.line + 1) + ": " + e.msg);
+      throw ConfigError(yaml_fault(where, e));
     }
     const YAML::Node root = document.IsMap() && document["scene"] ? document["scene"] : document;
     scene_.semantics = simulated_semantics();

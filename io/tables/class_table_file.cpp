@@ -6,11 +6,11 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <sstream>
 
 #include "core/error.h"
 #include "io/files/text_input.h"
+#include "io/files/yaml_problems.h"
 #include "io/files/yaml_text.h"
 
 namespace felt {
@@ -21,7 +21,7 @@ constexpr size_t kLimitBytes = 1 << 24;
 
 struct Table {
   std::vector<ClassInfo> classes;
-  std::vector<std::string> problems;
+  YamlProblems found;
 };
 
 bool means_no_class(const std::string& name) {
@@ -47,22 +47,17 @@ std::optional<Rgba8> color_of(const std::vector<std::string>& words) {
 
 std::string scalar_text(const YAML::Node& node) { return node && node.IsScalar() ? node.Scalar() : std::string(); }
 
-void read_yaml_class(const YAML::Node& row, const fs::path& path, Table& table) {
-  const std::string where = path.string() + ":" + std::to_string(row.Mark().line + 1);
-  if (!row.IsMap()) {
-    table.problems.push_back(describe_mismatch(where, "class", "{id, name, color, ignore}", "something else"));
-    return;
-  }
+void read_yaml_class(const YAML::Node& row, Table& table) {
+  if (!row.IsMap()) return table.found.problem(row, "class", "{id, name, color, ignore}", "something else");
   ClassInfo info;
   const int number = int(table.classes.size());
   const auto id = id_of(scalar_text(row["id"]));
   if (id)
     info.id = *id;
   else
-    table.problems.push_back(
-        describe_mismatch(where, "id", "a number from 0 to 65534", "'" + scalar_text(row["id"]) + "'"));
+    table.found.problem(row, "id", "a number from 0 to 65534", "'" + scalar_text(row["id"]) + "'");
   info.name = scalar_text(row["name"]);
-  if (info.name.empty()) table.problems.push_back(describe_mismatch(where, "name", "a name", "none"));
+  if (info.name.empty()) table.found.problem(row, "name", "a name", "none");
   info.color = default_class_color(number);
   if (row["color"]) {
     std::vector<std::string> words;
@@ -71,62 +66,43 @@ void read_yaml_class(const YAML::Node& row, const fs::path& path, Table& table) 
     if (const auto color = color_of(words))
       info.color = *color;
     else
-      table.problems.push_back(describe_mismatch(where, "color", "[r, g, b] from 0 to 255", "something else"));
+      table.found.problem(row, "color", "[r, g, b] from 0 to 255", "something else");
   }
   if (row["ignore"]) {
     bool ignore = false;
     if (YAML::convert<bool>::decode(row["ignore"], ignore))
       info.ignore = ignore;
     else
-      table.problems.push_back(
-          describe_mismatch(where, "ignore", "true or false", "'" + scalar_text(row["ignore"]) + "'"));
+      table.found.problem(row, "ignore", "true or false", "'" + scalar_text(row["ignore"]) + "'");
   }
   if (row["prior"]) {
     const auto prior = parse_number(scalar_text(row["prior"]));
     if (prior && *prior > 0 && std::isfinite(*prior))
       info.prior = *prior;
     else
-      table.problems.push_back(
-          describe_mismatch(where, "prior", "a number above 0", "'" + scalar_text(row["prior"]) + "'"));
+      table.found.problem(row, "prior", "a number above 0", "'" + scalar_text(row["prior"]) + "'");
   }
-  for (const auto& entry : row) {
-    const std::string key = scalar_text(entry.first);
-    if (key != "id" && key != "name" && key != "color" && key != "ignore" && key != "prior")
-      table.problems.push_back(describe_mismatch(where, "key", "id, name, color, ignore or prior", "'" + key + "'"));
-  }
+  table.found.refuse_unknown(row, {"id", "name", "color", "ignore", "prior"});
   // A class whose id is unreadable would also be reported as a duplicate of class 0.
   if (id && !info.name.empty()) table.classes.push_back(info);
 }
 
-/// YAML keeps the first of two equal keys: which one was meant nobody knows.
-void refuse_repeated(const YAML::Node& node, const fs::path& path, Table& table) {
-  if (!node.IsMap()) return;
-  std::set<std::string> seen;
-  for (const auto& entry : node)
-    if (entry.first.IsScalar() && !seen.insert(entry.first.Scalar()).second)
-      table.problems.push_back(describe_mismatch(path.string() + ":" + std::to_string(entry.first.Mark().line + 1),
-                                                 "key", "each once", "'" + entry.first.Scalar() + "' again"));
-}
-
 Table read_yaml(const fs::path& path, const std::string& content) {
-  Table table;
+  Table table{{}, YamlProblems(path.string())};
   try {
     const YAML::Node root = YAML::Load(content);
     if (!root.IsMap() || !root["classes"] || !root["classes"].IsSequence())
       throw ConfigError(describe_mismatch(path.string(), "classes", "a list under the key 'classes'", "none"));
-    refuse_repeated(root, path, table);
-    for (const YAML::Node& row : root["classes"]) {
-      refuse_repeated(row, path, table);
-      read_yaml_class(row, path, table);
-    }
+    table.found.refuse_repeated(root);  // keys that are not ours are left alone
+    for (const YAML::Node& row : root["classes"]) read_yaml_class(row, table);
   } catch (const YAML::Exception& fault) {
-    throw ConfigError(path.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
+    throw ConfigError(yaml_fault(path.string(), fault));
   }
   return table;
 }
 
 Table read_csv(const fs::path& path, const std::string& content) {
-  Table table;
+  Table table{{}, YamlProblems(path.string())};
   LineReader lines(content, path);
   bool first = true;
   char separator = ',';
@@ -138,8 +114,9 @@ Table read_csv(const fs::path& path, const std::string& content) {
     first = false;
     if (header) continue;
     if (!id || words.size() < 2 || words[1].empty()) {
-      table.problems.push_back(describe_mismatch(lines.where(), "class", "id" + std::string(1, separator) + "name",
-                                                 "'" + std::string(lines.line().substr(0, 60)) + "'"));
+      table.found.problems.push_back(describe_mismatch(lines.where(), "class",
+                                                       "id" + std::string(1, separator) + "name",
+                                                       "'" + std::string(lines.line().substr(0, 60)) + "'"));
       continue;
     }
     ClassInfo info{*id, words[1], default_class_color(int(table.classes.size())), *id == 0 && means_no_class(words[1])};
@@ -149,8 +126,8 @@ Table read_csv(const fs::path& path, const std::string& content) {
       if (const auto color = color_of({words[2], words[3], words[4]}))
         info.color = *color;
       else
-        table.problems.push_back(describe_mismatch(lines.where(), "color", "r, g, b from 0 to 255",
-                                                   "'" + words[2] + ", " + words[3] + ", " + words[4] + "'"));
+        table.found.problems.push_back(describe_mismatch(lines.where(), "color", "r, g, b from 0 to 255",
+                                                         "'" + words[2] + ", " + words[3] + ", " + words[4] + "'"));
     }
     table.classes.push_back(info);
   }
@@ -165,11 +142,11 @@ ClassTable read_class_table(const fs::path& path) {
   Table table = path.extension() == ".csv" ? read_csv(path, content) : read_yaml(path, content);
   try {
     ClassTable classes(std::move(table.classes));
-    if (table.problems.empty()) return classes;
+    if (table.found.problems.empty()) return classes;
   } catch (const ConfigError& fault) {
-    table.problems.push_back(path.string() + ": " + fault.what());
+    table.found.problems.push_back(path.string() + ": " + fault.what());
   }
-  throw ConfigError(table.problems);
+  throw ConfigError(table.found.problems);
 }
 
 std::string class_table_yaml(const ClassTable& classes) {

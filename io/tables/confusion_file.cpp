@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "io/files/text_input.h"
+#include "io/files/yaml_problems.h"
 
 namespace felt {
 namespace {
@@ -128,7 +129,7 @@ std::vector<double> parse_yaml_counts(const std::string& text, const ClassTable&
       counts.row(names[i], scalars(root["counts"][i]), at(root["counts"][i]));
     return counts.take();
   } catch (const YAML::Exception& fault) {
-    throw ConfigError(where + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
+    throw ConfigError(yaml_fault(where, fault));
   }
 }
 

@@ -105,7 +105,7 @@ PropertyTable parse_properties(const std::string& text, const std::string& where
   try {
     document = YAML::Load(text);
   } catch (const YAML::Exception& e) {
-    throw ConfigError(where + ":" + std::to_string(e.mark.line + 1) + ": not YAML: " + e.msg);
+    throw ConfigError(yaml_fault(where, e, "not YAML"));
   }
   Walker walker(where);
   std::vector<Property> properties;

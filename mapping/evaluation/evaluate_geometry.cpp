@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/median.h"
 
 namespace felt {
 namespace {
@@ -41,12 +42,6 @@ double mean(const std::vector<double>& values) {
   double sum = 0;
   for (const double v : values) sum += v;
   return sum / double(values.size());
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 double share_below(const std::vector<double>& values, double threshold) {

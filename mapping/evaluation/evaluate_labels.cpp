@@ -177,21 +177,19 @@ void add_view(LabelScores& scores, const LabelPrediction& prediction, const Refe
 
 void add_surface(LabelScores& scores, const Map& map, const VoxelBeliefs& beliefs, const LabelledMesh& reference,
                  const TruthClasses& classes, const GeometryOptions& options, const ObservingCameras* cameras) {
-  add_samples(
-      scores, samples_of(reference, options, cameras), reference, classes,
-      [&](const Vector3d& p, LabelScores& part, int truth) {
-        const Vector3d q = p / map.voxel_size_m;
-        if (!(q.array().abs().maxCoeff() < 1e9)) return part.counts.add(truth, -1);
-        const Index3 voxel{int32_t(std::lround(q.x())), int32_t(std::lround(q.y())), int32_t(std::lround(q.z()))};
-        const uint32_t block = map.store.find(block_of_voxel(voxel));
-        if (block == BlockStore::kNone) return part.counts.add(truth, -1);
-        const VoxelRef at{block, uint16_t(offset_in_block(voxel))};
-        if (!(map.store[block].geometry->weight[at.offset] > 0)) return part.counts.add(truth, -1);
-        part.counts.add(truth, beliefs.strongest_class(at));
-        std::vector<double> belief(size_t(beliefs.classes()));
-        beliefs.class_probability(at, belief);
-        part.calibration.add(belief, truth);
-      });
+  add_samples(scores, samples_of(reference, options, cameras), reference, classes,
+              [&](const Vector3d& p, LabelScores& part, int truth) {
+                const std::optional<Index3> voxel = nearest_voxel(map, p);
+                if (!voxel) return part.counts.add(truth, -1);
+                const uint32_t block = map.store.find(block_of_voxel(*voxel));
+                if (block == BlockStore::kNone) return part.counts.add(truth, -1);
+                const VoxelRef at{block, uint16_t(offset_in_block(*voxel))};
+                if (!(map.store[block].geometry->weight[at.offset] > 0)) return part.counts.add(truth, -1);
+                part.counts.add(truth, beliefs.strongest_class(at));
+                std::vector<double> belief(size_t(beliefs.classes()));
+                beliefs.class_probability(at, belief);
+                part.calibration.add(belief, truth);
+              });
 }
 
 void add_surface(LabelScores& scores, const LabelledMesh& evaluated, const TruthClasses& evaluated_classes,

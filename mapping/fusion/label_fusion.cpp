@@ -265,6 +265,17 @@ LabelStats fuse_soft(const BandVoxels& band, const LabelView& view, Block& block
   return stats;
 }
 
+/// One vote for `id` (not 0): Boyer and Moore's majority vote.
+void vote_instance(InstancePlanes& planes, int offset, uint16_t id) {
+  constexpr uint16_t kMostVotes = 255;  // an old map stays able to change
+  uint16_t& votes = planes.votes[offset];
+  if (votes == 0) planes.id[offset] = id;
+  if (planes.id[offset] == id)
+    votes = std::min<uint16_t>(uint16_t(votes + 1), kMostVotes);
+  else
+    --votes;
+}
+
 void fuse_instances(const BandVoxels& band, const Image<uint16_t>& instances, Block& block, BlockStore& store) {
   for (int i = 0; i < band.count; ++i) {
     const uint16_t id = instances.data()[uint32_t(band.pixel[i])];
@@ -326,16 +337,6 @@ LabelView label_view(const Frame& frame, const ClassTable& classes, const LabelC
           .config = config,
           .band_m = float(config.band_vox * voxel_size_m),
           .evidence = float(config.evidence * novelty)};
-}
-
-void vote_instance(InstancePlanes& planes, int offset, uint16_t id) {
-  constexpr uint16_t kMostVotes = 255;  // an old map stays able to change
-  uint16_t& votes = planes.votes[offset];
-  if (votes == 0) planes.id[offset] = id;
-  if (planes.id[offset] == id)
-    votes = std::min<uint16_t>(uint16_t(votes + 1), kMostVotes);
-  else
-    --votes;
 }
 
 void LabelFusion::add(const BlockObservation& observation, Block& block) {

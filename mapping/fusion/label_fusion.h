@@ -85,7 +85,4 @@ private:
   LabelStats stats_;
 };
 
-/// One vote for `id` (not 0): Boyer and Moore's majority vote.
-void vote_instance(InstancePlanes& planes, int offset, uint16_t id);
-
 }  // namespace felt

@@ -3,15 +3,13 @@
 #include <tbb/parallel_for.h>
 
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
+#include "core/stopwatch.h"
+
 namespace felt {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// Per-pixel factor of (d - z) to the tangent plane.
 const float* tangent_scale(const Frame& frame, const IntegrationConfig& config, IntegrationScratch& scratch) {
@@ -40,16 +38,13 @@ const float* tangent_scale(const Frame& frame, const IntegrationConfig& config, 
 float least_usable_m(float min_depth_m) { return std::max(min_depth_m, std::numeric_limits<float>::min()); }
 
 /// Finds or creates the blocks, with the planes that this frame writes: the only serial step.
-size_t allocate_blocks(Map& map, const std::vector<BlockCoord>& coords, bool with_color,
-                       std::vector<uint32_t>& blocks) {
-  const size_t before = map.store.size();
+void allocate_blocks(Map& map, const std::vector<BlockCoord>& coords, bool with_color, std::vector<uint32_t>& blocks) {
   blocks.clear();
   blocks.reserve(coords.size());
   for (const BlockCoord& coord : coords) {
     blocks.push_back(map.store.find_or_create(coord));
     if (with_color) map.store.add_color(map.store[blocks.back()]);
   }
-  return map.store.size() - before;
 }
 
 /// Carving reaches what the map has in the free space before this frame's surfaces, besides the blocks around them.
@@ -139,15 +134,15 @@ DepthView depth_view(const Frame& frame, const IntegrationConfig& config, const 
 
 FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& config, IntegrationScratch& scratch) {
   FrameStats stats;
-  const auto start = Clock::now();
+  const Stopwatch allocating;
   std::vector<BlockCoord> coords =
       blocks_in_view(frame.depth_m, frame.camera, frame.T_world_camera, map.voxel_size_m, map.truncation_m,
                      least_usable_m(config.min_depth_m), config.max_depth_m, scratch.allocation);
-  stats.blocks_created = allocate_blocks(map, coords, !frame.color.empty(), scratch.blocks);
+  allocate_blocks(map, coords, !frame.color.empty(), scratch.blocks);
   stats.blocks_in_view = coords.size();
-  stats.allocate_s = seconds_since(start);
+  stats.allocate_s = allocating.seconds();
 
-  const auto fusing = Clock::now();
+  const Stopwatch fusing;
   // Distance to the tangent plane is shorter than along the optical axis: a voxel far in front may be in the band.
   const bool tangent = config.distance == DistanceModel::tangent_plane;
   const DepthView view = depth_view(frame, config, map, tangent ? tangent_scale(frame, config, scratch) : nullptr,
@@ -161,11 +156,9 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
                    : 1;
   const LabelView labels = label_view(frame, map.classes, config.labels, map.voxel_size_m, novelty);
   const bool labelled = labels.says_classes() || labels.says_instances();
-  std::atomic<size_t> updated{0};
   std::atomic<uint64_t> label_voxels{0}, label_unknown{0}, label_invalid{0};
   tbb::parallel_for(tbb::blocked_range<size_t>(0, coords.size(), 16), [&](const tbb::blocked_range<size_t>& range) {
     BlockObservation observation;
-    size_t observed = 0;
     LabelFusion fusion(labels, map.store);
     uint64_t next_cubes = cubes_in_band(coords[range.begin()], view);
     for (size_t n = range.begin(); n < range.end(); ++n) {
@@ -176,20 +169,17 @@ FrameStats integrate(Map& map, const Frame& frame, const IntegrationConfig& conf
         prefetch(map.store[scratch.blocks[n + 1]], next_cubes);
       }
       if (cubes == 0 || !observe_block(coords[n], view, observation, cubes)) continue;
-      ++observed;
       fuse_tsdf(observation, view.max_weight, *block.geometry);
       if (block.color != nullptr && rgba != nullptr) fuse_color(observation, rgba, color_band_m, *block.color);
       if (labelled) fusion.add(observation, block);
     }
     const LabelStats label_stats = fusion.finish();
-    updated.fetch_add(observed, std::memory_order_relaxed);
     label_voxels.fetch_add(label_stats.voxels, std::memory_order_relaxed);
     label_unknown.fetch_add(label_stats.unknown, std::memory_order_relaxed);
     label_invalid.fetch_add(label_stats.invalid, std::memory_order_relaxed);
   });
-  stats.blocks_updated = updated;
   stats.labels = {label_voxels, label_unknown, label_invalid};
-  stats.fuse_s = seconds_since(fusing);
+  stats.fuse_s = fusing.seconds();
   return stats;
 }
 

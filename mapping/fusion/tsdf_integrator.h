@@ -15,8 +15,6 @@ namespace felt {
 /// What fusing one frame did.
 struct FrameStats {
   size_t blocks_in_view = 0;  ///< blocks near the measured surface
-  size_t blocks_created = 0;
-  size_t blocks_updated = 0;  ///< blocks with at least one observed voxel
   LabelStats labels;
   double allocate_s = 0;  ///< finding and creating blocks
   double fuse_s = 0;      ///< updating every channel

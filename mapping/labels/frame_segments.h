@@ -11,8 +11,8 @@ namespace felt {
 
 /// When two neighbouring pixels of a depth image lie on one smooth surface.
 struct FrameSegmentSettings {
-  double normal_change_deg =
-      10;  ///< largest angle between their normals, taken three pixels further out (of 640 across)
+  /// Largest angle between their normals, taken three pixels further out (of 640 across).
+  double normal_change_deg = 10;
   double plane_distance_m = 0.004;  ///< largest distance of a point to the other's tangent plane
   double depth_step_m = 0.02;       ///< largest difference of depth
   double noise_free_m = 1.5;        ///< beyond this depth both distances grow with the square of depth
@@ -25,9 +25,9 @@ struct FrameSegmentSettings {
 /// Working memory of `frame_segments`, reused from frame to frame: fresh memory costs more than the work.
 struct FrameSegmentScratch {
   std::vector<float> depth, smooth, step, normal[3], spare, spare_normal[3];
-  std::vector<uint32_t> run, parent, size;  ///< first pixels of runs joined along a row, their union-find; pieces
-  std::vector<uint32_t> piece, open, wave,
-      next;                                    ///< piece of each pixel; pixels of none, and those that grow into them
+  std::vector<uint32_t> run, parent, size;     ///< first pixels of runs joined along a row, their union-find; pieces
+  std::vector<uint32_t> piece, open;           ///< piece of each pixel; pixels of none
+  std::vector<uint32_t> wave, next;            ///< pixels that grow into them
   std::vector<uint8_t> join_right, join_down;  ///< of one row
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/text.h"
 
 namespace felt {
 
@@ -14,8 +15,7 @@ IgnoredClasses ignored_classes(const ClassTable& table, const std::vector<std::s
   for (const std::string& name : names) {
     const auto found = std::find_if(classes.begin(), classes.end(), [&](const ClassInfo& c) { return c.name == name; });
     if (found == classes.end()) {
-      std::string known;
-      for (const ClassInfo& c : classes) known += (known.empty() ? "" : ", ") + c.name;
+      const std::string known = listed(classes, &ClassInfo::name);
       problems.push_back(describe_mismatch(where, "class",
                                            known.empty() ? "a class of a table, which there is not" : "one of " + known,
                                            "'" + name + "'"));

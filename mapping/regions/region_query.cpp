@@ -8,6 +8,7 @@
 #include <map>
 #include <numbers>
 
+#include "core/text.h"
 #include "mapping/regions/map_segments.h"
 #include "mapping/regions/region_flood.h"
 #include "mapping/regions/region_surface.h"
@@ -15,11 +16,7 @@
 namespace felt {
 namespace {
 
-std::string metres(double x) {
-  char text[32];
-  snprintf(text, sizeof text, "%.3f m", x);
-  return text;
-}
+std::string metres(double x) { return number_text(x, "%.3f m"); }
 
 SurfaceRule band_rule(const Map& map, const RegionSettings& settings) {
   SurfaceRule rule;
@@ -106,12 +103,11 @@ Region segment_around(const Map& map, const Contact& contact, const RegionSettin
   throw TouchError("region segment: contact: expected a surface that is part of a segment, found a piece too small");
 }
 
-/// Says what is at a point that is too far from every surface.
+/// Says what is at a point, one that a map has, that is too far from every surface.
 [[noreturn]] void fail_to_snap(const Map& map, const Eigen::Vector3d& p, const std::string& where, double radius_m,
                                double min_weight) {
   const std::string expected = "observed surface within " + metres(radius_m);
-  const Eigen::Vector3d q = p / map.voxel_size_m;
-  const Index3 v{int32_t(std::lround(q.x())), int32_t(std::lround(q.y())), int32_t(std::lround(q.z()))};
+  const Index3 v = *nearest_voxel(map, p);
   const Block* block = map.store.get(block_of_voxel(v));
   if (block != nullptr && block->geometry->weight[offset_in_block(v)] > 0) {
     const double d = block->geometry->tsdf[offset_in_block(v)];
@@ -131,7 +127,8 @@ Region segment_around(const Map& map, const Contact& contact, const RegionSettin
     lo = lo.min(first - 0.5);
     hi = hi.max(first + 7.5);
   }
-  const bool outside = map.store.empty() || (q.array() < lo).any() || (q.array() > hi).any();
+  const Eigen::Array3d q = p / map.voxel_size_m;
+  const bool outside = map.store.empty() || (q < lo).any() || (q > hi).any();
   throw TouchError(
       describe_mismatch(where, "contact", expected, outside ? "a point outside the map" : "unobserved space"));
 }
@@ -141,11 +138,11 @@ Region segment_around(const Map& map, const Contact& contact, const RegionSettin
 Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const RegionSettings& settings) {
   char where[96];
   snprintf(where, sizeof where, "point (%.3f, %.3f, %.3f)", point_m.x(), point_m.y(), point_m.z());
-  const Eigen::Vector3d q = point_m / map.voxel_size_m;
-  if (!q.allFinite() || q.array().abs().maxCoeff() > 1e9)
+  if (!nearest_voxel(map, point_m))
     throw TouchError(
         describe_mismatch(where, "contact", "three finite coordinates inside the map", std::string(where).substr(6)));
   const SurfaceRule band = band_rule(map, settings);
+  const Eigen::Vector3d q = point_m / map.voxel_size_m;
   const double radius = settings.snap_voxels;
   const auto lo = [&](double x) { return int32_t(std::ceil(x - radius)); };
   const auto hi = [&](double x) { return int32_t(std::floor(x + radius)); };
@@ -230,8 +227,8 @@ Region find_region(const Map& map, const ViewMask& view, const RegionSettings& s
   const Eigen::Isometry3d T_camera_world = view.T_world_camera.inverse();
   const double vs = map.voxel_size_m;
   const auto in_camera = [&](const BlockCoord& c, int i) -> Eigen::Vector3d {
-    const Index3 f = first_voxel(c), v = voxel_of_offset(i);
-    return T_camera_world * (Eigen::Vector3d(f.x + v.x, f.y + v.y, f.z + v.z) * vs);
+    const Index3 v = voxel_at(c, i);
+    return T_camera_world * (Eigen::Vector3d(v.x, v.y, v.z) * vs);
   };
   const auto for_each_voxel = [&](const auto& visit) {
     for (size_t b = 0; b < surface.blocks(); ++b)

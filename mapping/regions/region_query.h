@@ -1,15 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <limits>
-#include <optional>
+#include <cstddef>
 #include <string>
 #include <vector>
 
-#include "core/camera.h"
-#include "core/image.h"
 #include "mapping/map.h"
-#include "mapping/regions/region_surface.h"
+#include "mapping/regions/view_mask.h"
 #include "mapping/store/region.h"
 #include "mapping/store/region_settings.h"
 
@@ -23,13 +20,6 @@ struct Contact {
   double distance_m = 0;      ///< between the two points
   Index3 voxel;               ///< of the surface band, nearest to the point
   int slot = -1;              ///< strongest class of the surface band within two voxels; -1 where the map has no labels
-};
-
-/// An image mask with the camera that took it: non-zero pixels belong to the region.
-struct ViewMask {
-  Image<uint8_t> mask;
-  PinholeCamera camera;
-  Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();
 };
 
 /// Snaps a world point to the surface. Throws TouchError with what is there instead: not finite, outside the map,
@@ -46,8 +36,7 @@ Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const Regio
 /// * `sphere`: the surface band within radius_m of the contact.
 /// * `instance`: the surface band of the thing that the contact belongs to, wherever it is in the map.
 /// * `segment`: the contact's segment among those that the whole map is cut into (mapping/regions/map_segments.h), as
-/// far as it
-///   lies within radius_m. `color_change` is then between neighbours, CIE Lab units.
+///   far as it lies within radius_m. `color_change` is then between neighbours, CIE Lab units.
 /// Deterministic; blocks are examined in parallel.
 Region find_region(const Map& map, const Contact& contact, const RegionSettings& settings);
 
@@ -55,6 +44,11 @@ Region find_region(const Map& map, const Contact& contact, const RegionSettings&
 /// the surface around the contact is noisy, three times the median angle between neighbouring normals there, at
 /// most 30. A crease stops every region whose limit is below half the angle by which the surface turns (docs/touch.md).
 double normal_limit_deg(const Map& map, const Contact& contact, const RegionSettings& settings);
+
+struct FittedNormal {
+  Eigen::Vector3d normal;
+  double sd_rad = 0;  ///< about how far it may be off
+};
 
 /// Unit normal of the surface around a contact, towards free space: of the plane that fits it within eight voxels. That
 /// of a single voxel (Contact::normal) is off by several degrees on a noisy surface.
@@ -72,7 +66,6 @@ struct RegionSummary {
   Eigen::Vector3d min_m, max_m;  ///< extent of the voxel centres, world
   std::vector<size_t> class_voxels;  ///< by slot: voxels whose strongest class it is
   size_t unlabelled_voxels = 0;
-  std::vector<double> pooled_belief;  ///< sum of concentrations by slot over their total
   int necks = 0;                      ///< pieces of at least 5 % that two voxels of erosion leave, less one
   double mixed_fraction = 0;          ///< labelled voxels whose strongest class is not the region's
   double open_boundary_fraction = 0;  ///< boundary voxels that end at unobserved space, of all boundary voxels

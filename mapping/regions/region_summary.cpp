@@ -75,23 +75,20 @@ struct Part {
   double area_m2 = 0;
   Index3 lo, hi;
   std::vector<size_t> class_voxels;
-  std::vector<double> evidence;
   size_t unlabelled = 0, open = 0, boundary = 0;
   BlockMask boundary_bits;
 };
 
 Part examine(const Map& map, const Region& region, size_t b, const RegionSettings& settings) {
-  const size_t k = size_t(map.classes.size());
   const float band_m = float(settings.band_voxels * map.voxel_size_m), min_weight = float(settings.min_weight);
   Part part;
-  part.class_voxels.assign(k, 0);
-  part.evidence.assign(k, 0);
+  part.class_voxels.assign(size_t(map.classes.size()), 0);
   const Block& block = *map.store.get(region.coord[b]);
   const Index3 f = first_voxel(region.coord[b]);
   part.lo = {f.x + 8, f.y + 8, f.z + 8};
   part.hi = f;
   for_each_bit(region.mask[b], [&](int i) {
-    const Index3 o = voxel_of_offset(i), v{f.x + o.x, f.y + o.y, f.z + o.z};
+    const Index3 v = voxel_at(block.coord, i);
     part.lo = {std::min(part.lo.x, v.x), std::min(part.lo.y, v.y), std::min(part.lo.z, v.z)};
     part.hi = {std::max(part.hi.x, v.x), std::max(part.hi.y, v.y), std::max(part.hi.z, v.z)};
     const Eigen::Vector3f normal = surface_normal(map, v, min_weight);
@@ -103,11 +100,8 @@ Part examine(const Map& map, const Region& region, size_t b, const RegionSetting
     int strongest = -1;
     for (const EvidencePlane& e : block.evidence) {
       const float count = e.counts->value[i];
-      part.evidence[e.slot] += double(count);
       if (count > best) best = count, strongest = e.slot;
     }
-    if (block.even_evidence != nullptr)
-      for (double& e : part.evidence) e += double(block.even_evidence->value[i]) / double(k);
     ++(strongest < 0 ? part.unlabelled : part.class_voxels[size_t(strongest)]);
 
     bool open = false, other = false;
@@ -145,7 +139,6 @@ RegionSummary summarize(const Map& map, const Region& region, const RegionSettin
   out.voxels = region.voxels();
   out.blocks = region.blocks();
   out.class_voxels.assign(k, 0);
-  for (size_t c = 0; c < k; ++c) out.pooled_belief.push_back(double(out.voxels) * map.classes.prior(int(c)));
   Region boundary;
   size_t open = 0;
   Eigen::Array3d lo = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
@@ -153,10 +146,7 @@ RegionSummary summarize(const Map& map, const Region& region, const RegionSettin
     const Part& part = parts[b];
     lo = lo.min(Eigen::Array3d(part.lo.x, part.lo.y, part.lo.z));
     hi = hi.max(Eigen::Array3d(part.hi.x, part.hi.y, part.hi.z));
-    for (size_t c = 0; c < k; ++c) {
-      out.class_voxels[c] += part.class_voxels[c];
-      out.pooled_belief[c] += part.evidence[c];
-    }
+    for (size_t c = 0; c < k; ++c) out.class_voxels[c] += part.class_voxels[c];
     out.area_m2 += part.area_m2;
     out.unlabelled_voxels += part.unlabelled;
     out.boundary_voxels += part.boundary;
@@ -165,9 +155,6 @@ RegionSummary summarize(const Map& map, const Region& region, const RegionSettin
   }
   out.min_m = lo.matrix() * map.voxel_size_m;
   out.max_m = hi.matrix() * map.voxel_size_m;
-  double total = 0;
-  for (const double p : out.pooled_belief) total += p;
-  for (double& p : out.pooled_belief) p /= total;
 
   const size_t labelled = out.voxels - out.unlabelled_voxels;
   if (labelled > 0)

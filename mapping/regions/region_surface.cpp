@@ -6,14 +6,21 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <utility>
 #include <vector>
 
+#include "core/median.h"
 #include "mapping/regions/interior_kernels.h"
+#include "mapping/regions/region_query.h"
 
 namespace felt {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+/// How far, in voxels, the surface of a voxel that ends a region may lie off the plane of one that the region grows
+/// through.
+constexpr float kOffPlane = 0.5f;
 
 void copy_observed(const Block* block, int first, int count, float min_weight, float* out) {
   if (block == nullptr) {
@@ -234,9 +241,8 @@ void for_band_near(const Map& map, const Index3& centre, const SurfaceRule& rule
     if (!band.any()) return;
     SurfaceTile tile;
     gather(near, everywhere, rule.min_weight, tile);
-    const Index3 f = first_voxel(c);
     for_each_bit(band, [&](int offset) {
-      const Index3 v = voxel_of_offset(offset), global{f.x + v.x, f.y + v.y, f.z + v.z};
+      const Index3 v = voxel_of_offset(offset), global = voxel_at(c, offset);
       if (is_near(global, centre)) visit(tile, v, global);
     });
   };
@@ -250,7 +256,7 @@ void for_band_near(const Map& map, const Index3& centre, const SurfaceRule& rule
 }  // namespace
 
 double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule& rule) {
-  std::vector<float> cosines;
+  std::vector<double> cosines;
   for_band_near(map, centre, rule, [&](const SurfaceTile& tile, const Index3& v, const Index3& global) {
     if ((global.x + global.y + global.z) % 2 != 0) return;  // every other voxel says enough
     const SurfaceNormal own = smoothed_normal(tile, SurfaceTile::index(v.x, v.y, v.z));
@@ -260,13 +266,11 @@ double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule&
           !(std::abs(tile.tsdf[at]) <= rule.band_m))
         continue;
       const SurfaceNormal its = smoothed_normal(tile, at);
-      cosines.push_back(own.x * its.x + own.y * its.y + own.z * its.z);
+      cosines.push_back(double(own.x * its.x + own.y * its.y + own.z * its.z));
     }
   });
   if (cosines.empty()) return 0;
-  const auto middle = cosines.begin() + std::ptrdiff_t(cosines.size() / 2);
-  std::nth_element(cosines.begin(), middle, cosines.end());
-  return std::acos(std::clamp(double(*middle), -1.0, 1.0)) * 180 / std::numbers::pi;
+  return std::acos(std::clamp(median(std::move(cosines)), -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
 FittedNormal fitted_normal(const Map& map, const Index3& centre, const Eigen::Vector3d& along,
@@ -308,12 +312,6 @@ void gather_around(const Map& map, const Index3& voxel, float min_weight, Surfac
 }
 
 }  // namespace
-
-SurfacePlane surface_plane(const Map& map, const Index3& voxel, float min_weight) {
-  SurfaceTile tile;
-  gather_around(map, voxel, min_weight, tile);
-  return fitted_plane(tile, SurfaceTile::index(0, 0, 0));
-}
 
 Eigen::Vector3f surface_normal(const Map& map, const Index3& voxel, float min_weight) {
   SurfaceTile tile;

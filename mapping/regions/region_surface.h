@@ -2,14 +2,16 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <vector>
 
 #include "mapping/map.h"
-#include "mapping/regions/interior_kernels.h"
 #include "mapping/store/region.h"
 
 namespace felt {
+
+struct FittedNormal;
 
 /// What makes a voxel a candidate of a region, resolved to numbers of the map.
 struct SurfaceRule {
@@ -47,9 +49,7 @@ using BlockNeighbours = std::array<const Block*, 27>;
 /// Reads the block and its neighbours; blocks may be examined in parallel.
 BlockSurface examine_block(const BlockNeighbours& near, const SurfaceRule& rule);
 
-/// How far, in voxels, the surface of a voxel that ends a region may lie off the plane of one that the region grows
-/// through, at most kCollar voxels from it (along each axis).
-constexpr float kOffPlane = 0.5f;
+/// How far, in voxels along each axis, a voxel that ends a region may be from one that the region grows through.
 constexpr int kCollar = 2;
 
 /// Of the voxels in `open` (by neighbour, null for none), those within kCollar voxels of a voxel of the block in
@@ -61,18 +61,10 @@ std::array<BlockMask, 27> on_planes_of(const BlockNeighbours& near, const BlockM
 /// band within eight voxels of it (those ahead of every other voxel). 0 where there are none.
 double normal_noise_deg(const Map& map, const Index3& centre, const SurfaceRule& rule);
 
-struct FittedNormal {
-  Eigen::Vector3d normal;
-  double sd_rad = 0;  ///< about how far it may be off
-};
-
 /// Unit normal of the plane that fits the surface within eight voxels of a voxel best (least squares), where its own
 /// normals are less than 45 degrees off `along`, a unit vector: an edge nearby does not turn it. `along` where no plane
 /// fits.
 FittedNormal fitted_normal(const Map& map, const Index3& centre, const Eigen::Vector3d& along, const SurfaceRule& rule);
-
-/// `fitted_plane` (mapping/regions/interior_kernels.h) at a voxel.
-SurfacePlane surface_plane(const Map& map, const Index3& voxel, float min_weight);
 
 /// Unit normal of the surface at a voxel, towards free space: `smoothed_normal` (mapping/regions/interior_kernels.h).
 /// Zero where there is none.

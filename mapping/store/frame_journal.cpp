@@ -20,12 +20,6 @@ size_t frame_count(const FrameJournal& journal) {
   return n;
 }
 
-bool holds_frame(const FrameJournal& journal, const std::string& sequence, int64_t index) {
-  return std::any_of(journal.runs.begin(), journal.runs.end(), [&](const FusedFrames& run) {
-    return run.sequence == sequence && std::find(run.frames.begin(), run.frames.end(), index) != run.frames.end();
-  });
-}
-
 std::vector<std::pair<std::string, int64_t>> shared_frames(const FrameJournal& a, const FrameJournal& b) {
   const auto all = [](const FrameJournal& journal) {
     std::set<std::pair<std::string, int64_t>> frames;
@@ -37,6 +31,19 @@ std::vector<std::pair<std::string, int64_t>> shared_frames(const FrameJournal& a
   std::vector<std::pair<std::string, int64_t>> shared;
   std::set_intersection(in_a.begin(), in_a.end(), in_b.begin(), in_b.end(), std::back_inserter(shared));
   return shared;
+}
+
+size_t frames_of_same_images(const FrameJournal& a, const FrameJournal& b) {
+  const auto images = [](const FusedFrames& run) { return run.sequence.substr(0, 16); };
+  std::set<std::pair<std::string, int64_t>> frames;
+  for (const FusedFrames& run_a : a.runs)
+    for (const FusedFrames& run_b : b.runs) {
+      if (run_a.sequence == run_b.sequence || images(run_a) != images(run_b)) continue;
+      const std::set<int64_t> in_a(run_a.frames.begin(), run_a.frames.end());
+      for (const int64_t index : run_b.frames)
+        if (in_a.contains(index)) frames.emplace(images(run_a), index);
+    }
+  return frames.size();
 }
 
 FrameJournal joined(const FrameJournal& a, const FrameJournal& b) {

@@ -1,7 +1,8 @@
 #include "mapping/store/region_settings.h"
 
 #include <cmath>
-#include <cstdio>
+
+#include "core/text.h"
 
 namespace felt {
 
@@ -33,9 +34,8 @@ void validate(const RegionSettings& s) {
   std::string problems;
   const auto expect = [&](bool good, const char* what, const char* expected, double found) {
     if (good) return;
-    char text[32];
-    snprintf(text, sizeof text, "%g", found);
-    problems.append(problems.empty() ? "" : "\n").append(describe_mismatch("region", what, expected, text));
+    problems.append(problems.empty() ? "" : "\n");
+    problems.append(describe_mismatch("region", what, expected, number_text(found)));
   };
   expect(s.band_voxels > 0 && s.band_voxels <= 8, "band_voxels", "0 < band <= 8", s.band_voxels);
   expect(s.min_weight > 0 && std::isfinite(s.min_weight), "min_weight", "a positive number", s.min_weight);

@@ -1,6 +1,5 @@
 #include "mapping/touch/property_view.h"
 
-#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -35,30 +34,39 @@ PropertyView::PropertyView(const Map& map, int property, TouchViews touched)
   }
 }
 
-PropertyEstimate PropertyView::estimate(const Eigen::Array3d& sums) const {
-  const double mean = sums[1] / sums[0];
-  return {float(origin_ + mean), float(std::sqrt(sums[2] / sums[0] - mean * mean)), false};
+PropertyEstimate PropertyView::estimate(const Eigen::Array3d& moments) const {
+  const double mean = moments[1] / moments[0];
+  return {float(origin_ + mean), float(std::sqrt(moments[2] / moments[0] - mean * mean)), false};
+}
+
+template <size_t n>
+void PropertyView::gather(const Block& block, int first, std::array<Sums, n>& voxels) const {
+  for (Sums& voxel : voxels) voxel.moments = prior_;
+  for (const EvidencePlane& e : block.evidence)
+    for (size_t i = 0; i < n; ++i) {
+      const double count = double(e.counts->value[size_t(first) + i]);
+      voxels[i].evidence += count;
+      voxels[i].moments += count * moments_[e.slot];
+    }
+  if (block.even_evidence != nullptr)
+    for (size_t i = 0; i < n; ++i) voxels[i].moments += double(block.even_evidence->value[size_t(first) + i]) * even_;
+}
+
+PropertyEstimate PropertyView::answer(const TouchView* view, int offset, const Sums& voxel) const {
+  const size_t p = size_t(property_), i = size_t(offset);
+  if (view != nullptr && view->mask.test(offset)) return {view->mean[p][i], view->sd[p][i], true};
+  if (voxel.evidence > 0 && voxel.moments[0] > 0) return estimate(voxel.moments);
+  return {kNoneF, kNoneF, false};
 }
 
 void PropertyView::copy(const Block& block, float* mean, float* sd) const {
-  std::array<double, kBlockVoxels> evidence{};
-  std::vector<Eigen::Array3d> sums(kBlockVoxels, prior_);
-  for (const EvidencePlane& e : block.evidence)
-    for (size_t i = 0; i < kBlockVoxels; ++i) {
-      evidence[i] += double(e.counts->value[i]);
-      sums[i] += double(e.counts->value[i]) * moments_[e.slot];
-    }
-  if (block.even_evidence != nullptr)
-    for (size_t i = 0; i < kBlockVoxels; ++i) sums[i] += double(block.even_evidence->value[i]) * even_;
+  std::array<Sums, kBlockVoxels> voxels;
+  gather(block, 0, voxels);
   const TouchView* view = view_of(*touched_, block.coord);
-  for (size_t i = 0; i < kBlockVoxels; ++i) {
-    PropertyEstimate answer{kNoneF, kNoneF, false};
-    if (view != nullptr && view->mask.test(int(i)))
-      answer = {view->mean[size_t(property_)][i], view->sd[size_t(property_)][i], true};
-    else if (evidence[i] > 0 && sums[i][0] > 0)
-      answer = estimate(sums[i]);
-    mean[i] = answer.mean;
-    sd[i] = answer.sd;
+  for (int i = 0; i < kBlockVoxels; ++i) {
+    const PropertyEstimate next = answer(view, i, voxels[size_t(i)]);
+    mean[i] = next.mean;
+    sd[i] = next.sd;
   }
 }
 
@@ -66,16 +74,9 @@ PropertyEstimate PropertyView::at(const Index3& voxel) const {
   const Block* block = map_.store.get(block_of_voxel(voxel));
   if (block == nullptr) return {kNoneF, kNoneF, false};
   const int i = offset_in_block(voxel);
-  if (const TouchView* view = view_of(*touched_, block->coord); view != nullptr && view->mask.test(i))
-    return {view->mean[size_t(property_)][size_t(i)], view->sd[size_t(property_)][size_t(i)], true};
-  double evidence = 0;
-  Eigen::Array3d sums = prior_;
-  for (const EvidencePlane& e : block->evidence) {
-    evidence += double(e.counts->value[i]);
-    sums += double(e.counts->value[i]) * moments_[e.slot];
-  }
-  if (block->even_evidence != nullptr) sums += double(block->even_evidence->value[i]) * even_;
-  return evidence > 0 && sums[0] > 0 ? estimate(sums) : PropertyEstimate{kNoneF, kNoneF, false};
+  std::array<Sums, 1> sums;
+  gather(*block, i, sums);
+  return answer(view_of(*touched_, block->coord), i, sums.front());
 }
 
 }  // namespace felt

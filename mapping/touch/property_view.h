@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -19,8 +21,9 @@ struct PropertyEstimate {
 using TouchViews = std::shared_ptr<const std::vector<TouchView>>;
 
 /// A property over the whole map, for grids, meshes and pictures: touched voxels from their touches, labelled ones from
-/// the priors of their classes in closed form. Within f32 what `Beliefs::at` gives. The map must outlive it and stay as
-/// it is; `at` and `copy` may be called from several threads at once.
+/// the priors of their classes in closed form. Within f32 what `Beliefs::at` gives: two numbers a voxel, for millions
+/// of voxels, where `VoxelBeliefs` gives whole distributions. The map must outlive it and stay as it is; `at` and
+/// `copy` may be called from several threads at once.
 class PropertyView {
 public:
   PropertyView(const Map& map, int property, TouchViews touched);
@@ -30,7 +33,18 @@ public:
   void copy(const Block& block, float* mean, float* sd) const;
 
 private:
-  PropertyEstimate estimate(const Eigen::Array3d& sums) const;
+  /// What the classes add up to at a voxel.
+  struct Sums {
+    double evidence = 0;     ///< above the priors
+    Eigen::Array3d moments;  ///< of all concentrations, as `moments_`
+  };
+
+  /// The sums of the voxels of a block from offset `first` on.
+  template <size_t n>
+  void gather(const Block& block, int first, std::array<Sums, n>& voxels) const;
+  /// By the block's view where touches reach, else by the sums.
+  PropertyEstimate answer(const TouchView* view, int offset, const Sums& voxel) const;
+  PropertyEstimate estimate(const Eigen::Array3d& moments) const;
 
   const Map& map_;
   int property_;

@@ -61,8 +61,7 @@ void start_from_material(const Map& map, MixtureBlock& block, const std::vector<
   Beliefs beliefs(map);
   size_t i = 0;
   for_each_bit(block.mask, [&](int offset) {
-    const Index3 f = first_voxel(block.coord), v = voxel_of_offset(offset);
-    std::vector<uint32_t> touches = covering_touches(map, {f.x + v.x, f.y + v.y, f.z + v.z});
+    std::vector<uint32_t> touches = covering_touches(map, voxel_at(block.coord, offset));
     if (beliefs.has_material(touches)) {
       std::vector<double> vision(k);
       for (size_t c = 0; c < k; ++c) vision[c] = double(block.a[c * m + i]);

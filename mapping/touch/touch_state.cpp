@@ -16,6 +16,9 @@
 namespace felt {
 namespace {
 
+/// No class of a pooled belief is below this.
+constexpr double kBeliefFloor = 1e-6;
+
 /// Vision concentrations of one voxel.
 std::vector<double> vision_concentration(const Map& map, const Index3& voxel) {
   std::vector<double> alpha(size_t(map.classes.size()));

@@ -51,10 +51,7 @@ struct MaterialState {
   std::vector<double> readings;               ///< by property
 };
 
-/// No class of a pooled belief is below this.
-constexpr double kBeliefFloor = 1e-6;
-
-/// What `mixture` readings start from where `material` readings came first: no class below kBeliefFloor of the total.
+/// What `mixture` readings start from where `material` readings came first: no class below 1e-6 of the total.
 /// One that the property says nothing of, or that the readings ruled out, would have no concentration at all, and a
 /// Dirichlet needs one.
 void apply_concentration_floor(std::span<double> concentration);

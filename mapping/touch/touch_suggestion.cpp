@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "core/text.h"
 #include "inference/class_posterior.h"
 #include "inference/information_gain.h"
 #include "mapping/regions/map_segments.h"
@@ -19,11 +20,6 @@ namespace {
 constexpr int kSeedsPerBlock = 8;
 constexpr double kLeastOutcome = 0.05;
 constexpr size_t kMostOutcomes = 4;
-
-Index3 voxel_at(const BlockCoord& block, int offset) {
-  const Index3 f = first_voxel(block), v = voxel_of_offset(offset);
-  return {f.x + v.x, f.y + v.y, f.z + v.z};
-}
 
 /// The region's voxel nearest to its centroid; the first of equals.
 Index3 middle_of(const Region& region) {
@@ -121,8 +117,7 @@ std::vector<Suggestion> suggest_touches(const Map& map, const std::string& prope
                                         const SuggestionSettings& settings) {
   const auto index = map.properties.index_of(property);
   if (!index) {
-    std::string names;
-    for (const Property& p : map.properties.properties()) names += (names.empty() ? "" : ", ") + p.name;
+    const std::string names = listed(map.properties.properties(), &Property::name);
     throw TouchError(describe_mismatch(
         "suggest", "property", names.empty() ? "a map with properties" : "one of " + names, "'" + property + "'"));
   }

@@ -1,7 +1,6 @@
 #include "mapping/touch/touch_update.h"
 
 #include <tbb/parallel_for.h>
-#include <cstdio>
 #include <limits>
 #include <string>
 #include <utility>
@@ -10,16 +9,11 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/text.h"
 #include "mapping/touch/touch_view.h"
 
 namespace felt {
 namespace {
-
-std::string number(double x) {
-  char text[32];
-  snprintf(text, sizeof text, "%g", x);
-  return text;
-}
 
 /// Statistics of one property over the touches of one block, voxel by voxel in canonical order (Welford). `planes` hold
 /// zeros.
@@ -107,26 +101,25 @@ void check_reading(const PropertyTable& properties, const ClassTable& classes, c
   const std::string where = "touch of '" + request.property + "'";
   const auto property = properties.index_of(request.property);
   if (!property) {
-    std::string known;
-    for (const Property& p : properties.properties()) known.append(known.empty() ? "" : ", ").append(p.name);
+    const std::string known = listed(properties.properties(), &Property::name);
     throw TouchError(describe_mismatch("touch", "property", known.empty() ? "a map with properties" : known,
                                        "'" + request.property + "'"));
   }
   const Property& p = properties[*property];
   if (!std::isfinite(request.value) || request.value < p.support_lo || request.value > p.support_hi)
-    throw TouchError(describe_mismatch(where, "value",
-                                       "a number in [" + number(p.support_lo) + ", " + number(p.support_hi) + "]",
-                                       number(request.value)));
+    throw TouchError(describe_mismatch(
+        where, "value", "a number in [" + number_text(p.support_lo) + ", " + number_text(p.support_hi) + "]",
+        number_text(request.value)));
   // Squares of what is kept must fit a float.
   constexpr double kLargest = 1e15;
   if (std::abs(request.value) > kLargest)
-    throw TouchError(describe_mismatch(where, "value", "a number of size up to 1e15", number(request.value)));
+    throw TouchError(describe_mismatch(where, "value", "a number of size up to 1e15", number_text(request.value)));
   if (!(request.sigma >= 0 && request.sigma <= kLargest))
-    throw TouchError(describe_mismatch(where, "sigma", "a number from 0 to 1e15", number(request.sigma)));
+    throw TouchError(describe_mismatch(where, "sigma", "a number from 0 to 1e15", number_text(request.sigma)));
   if (!std::isfinite(request.stamp_s))
-    throw TouchError(describe_mismatch(where, "stamp", "a finite time", number(request.stamp_s)));
+    throw TouchError(describe_mismatch(where, "stamp", "a finite time", number_text(request.stamp_s)));
   if (!std::isnan(request.rho) && !(request.rho >= 0 && request.rho < 1))
-    throw TouchError(describe_mismatch(where, "rho", "0 <= rho < 1", number(request.rho)));
+    throw TouchError(describe_mismatch(where, "rho", "0 <= rho < 1", number_text(request.rho)));
   if (!class_priors(p, classes).any())
     throw TouchError(describe_mismatch(where, "priors", "one of the map's classes with a prior", "none"));
   validate(request.region);
@@ -154,7 +147,7 @@ uint64_t add_touch(Map& map, Touch touch) {
 }
 
 TouchEffect TouchBatch::apply(Touch touch) {
-  const double psi = touch.request.value;
+  const double psi = touch.request.value, noise_sd = touch.request.sigma;
   const size_t property = size_t(*map_.properties.index_of(touch.request.property));
   TouchEffect effect;
   effect.before = Beliefs(map_).of(touch.region, covering_touches(map_, touch.region));
@@ -162,8 +155,8 @@ TouchEffect TouchBatch::apply(Touch touch) {
   const TouchedLabels::Answer before = labels_->of(touch.region);
   const StudentTMixture& expected = effect.before.next_reading[property];
   if (!expected.weight.empty()) {
-    effect.flags = region_flags(expected, psi);
-    effect.tail_probability = tail_probability(expected, psi);
+    effect.flags = region_flags(expected, psi, noise_sd);
+    effect.tail_probability = tail_probability(expected, psi, noise_sd);
   }
   effect.id = insert(map_.touches, std::move(touch));
   Touch& recorded = *map_.touches.find(effect.id);

@@ -25,8 +25,8 @@ uint64_t add_touch(Map& map, Touch touch);
 struct TouchEffect {
   uint64_t id = 0;
   Belief before, after;         ///< of the region as a whole, with all touches that cover the contact
-  RegionFlags flags;            ///< of the reading against `before`
-  double tail_probability = 1;  ///< of the reading under `before`
+  RegionFlags flags;            ///< of the reading with its noise against `before`
+  double tail_probability = 1;  ///< of the reading with its noise under `before`
   std::vector<double> modes;    ///< of the property after: more than one means "this or that"
   uint64_t relabelled = 0;      ///< voxels whose strongest class changed
   uint64_t refused = 0;         ///< voxels that kept their state: the projection was no valid prior

@@ -154,8 +154,7 @@ std::vector<TouchView> touch_views(const Map& map) {
   for (size_t b = 0; b < apart.blocks(); ++b) {
     TouchView& view = view_of(apart.coord[b]);
     for_each_bit(apart.mask[b], [&](int i) {
-      const Index3 f = first_voxel(apart.coord[b]), v = voxel_of_offset(i);
-      const Belief belief = beliefs.at({f.x + v.x, f.y + v.y, f.z + v.z});
+      const Belief belief = beliefs.at(voxel_at(apart.coord[b], i));
       put(view, i, cell_of(belief.class_probability, belief.next_reading));
     });
   }

@@ -9,7 +9,8 @@
 
 namespace felt {
 
-/// What viewers and planners see of one touched block: entries where `mask` is set.
+/// What viewers and planners see of one touched block: entries where `mask` is set. f32 means and spreads, as grids of
+/// millions of voxels keep them; `VoxelBeliefs` has the distributions.
 struct TouchView {
   BlockCoord coord;
   BlockMask mask;

@@ -10,7 +10,9 @@
 namespace felt {
 
 /// What the map believes of each voxel: vision counts and, where touches reach, the readings with them. Computed once,
-/// for touched voxels only, of a map that does not change meanwhile; queries may run in parallel.
+/// for touched voxels only, of a map that does not change meanwhile; queries may run in parallel. Pictures and
+/// evaluations need the f64 Student-t mixtures that it gives; for means and spreads of millions of voxels there are the
+/// closed forms of TouchView and PropertyView.
 class VoxelBeliefs {
 public:
   explicit VoxelBeliefs(const Map& map);

@@ -33,6 +33,18 @@ int64_t last_logged(const std::string& log) {
   return at == std::string::npos ? 0 : std::stoll(log.substr(at + words.size()));
 }
 
+/// Runs the command and kills it as soon as `map` is there, or is another file than before. The exit code is 0 where
+/// the run was sooner.
+CommandResult killed_at_the_next_checkpoint(const std::string& arguments, const fs::path& map) {
+  const TemporaryDirectory folder;
+  const fs::path before = folder.path() / "before";
+  if (fs::exists(map)) fs::copy_file(map, before);
+  return run_feltmap_within(
+      "", arguments,
+      " & pid=$!; until [ -e " + quoted(map) + " ] && ! cmp -s " + quoted(map) + " " + quoted(before) +
+          "; do kill -0 $pid 2>/dev/null || break; sleep 0.01; done; kill -9 $pid 2>/dev/null; wait $pid");
+}
+
 size_t parts_in(const fs::path& folder) {
   size_t parts = 0;
   for (const auto& entry : fs::directory_iterator(folder))
@@ -57,15 +69,20 @@ TEST_CASE(
   const double whole_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const std::string hash = json::parse(file_text(whole / "report.json")).at("map_hash");
 
+  // The first kills come at the next checkpoint, until one was before the end; the others at random moments.
   std::mt19937 engine(1);
-  int killed = 0, between = 0;
+  int killed = 0, between = 0, rounds = 0;
   while (killed < kills) {
+    REQUIRE(++rounds <= 10 * kills);
     fs::remove_all(out);
     int64_t saved = 0;
     for (bool done = false; !done;) {
       const double pause_s = killed < kills ? whole_s * double(engine() % 1000) / 1000 : 60;
+      const std::string arguments = reconstruct(sequence, out, "--checkpoint 10 --resume --log-level info");
       const CommandResult run =
-          run_feltmap_within("", reconstruct(sequence, out, "--checkpoint 10 --resume --log-level info"),
+          between == 0 ? killed_at_the_next_checkpoint(arguments, out / "map.vdb")
+                       : run_feltmap_within(
+                             "", arguments,
                              " & pid=$!; (sleep " + std::to_string(pause_s) +
                                  "; kill -9 $pid) 2>/dev/null & wait $pid; code=$?; kill $! 2>/dev/null; exit $code");
       INFO(run.err);
@@ -131,14 +148,9 @@ TEST_CASE("touches of a run that is stopped before, between and after them make 
   // Killed again and again, each time as soon as there is another checkpoint.
   std::vector<int64_t> stops;
   for (int64_t read = 0; read < 24;) {
-    const fs::path map = out / "map.vdb", mark = folder.path() / "mark";
-    fs::remove(mark);
-    if (fs::exists(map)) fs::copy_file(map, mark);
-    const CommandResult run = run_feltmap_within(
-        "", reconstruct(room, out, options + " --resume --threads 1"),
-        " & pid=$!; until [ -e " + quoted(map) + " ] && ! cmp -s " + quoted(map) + " " + quoted(mark) +
-            "; do kill -0 $pid 2>/dev/null || break; sleep 0.01; done; kill -9 $pid 2>/dev/null; wait $pid");
-    const int64_t now = frames_in(map);
+    const CommandResult run =
+        killed_at_the_next_checkpoint(reconstruct(room, out, options + " --resume --threads 1"), out / "map.vdb");
+    const int64_t now = frames_in(out / "map.vdb");
     INFO(run.err);
     REQUIRE(now > read);
     read = now;
@@ -154,6 +166,24 @@ TEST_CASE("touches of a run that is stopped before, between and after them make 
   // Once more after the end: nothing is applied twice, and the report still says what became of them.
   REQUIRE(run_feltmap(reconstruct(room, out, options + " --resume")).exit_code == 0);
   same_as_whole();
+}
+
+TEST_CASE("where views count by how new they are, a resumed run compares them with those of before the stop, too") {
+  const TemporaryDirectory folder;
+  const fs::path room = source_dir() / "data/scenes/room", whole = folder.path() / "whole", out = folder.path() / "out";
+  const std::string options = "--no-color --checkpoint 4 --label-novelty 0.5 --label-turn 20";
+  REQUIRE(run_feltmap(reconstruct(room, whole, options)).exit_code == 0);
+  const CommandResult stopped =
+      killed_at_the_next_checkpoint(reconstruct(room, out, options + " --threads 1"), out / "map.vdb");
+  INFO(stopped.err);
+  REQUIRE(stopped.exit_code == 128 + 9);
+  const int64_t read = frames_in(out / "map.vdb");
+  CHECK(read > 0);
+  CHECK(read < 24);
+  REQUIRE(run_feltmap(reconstruct(room, out, options + " --resume")).exit_code == 0);
+  CHECK(json::parse(file_text(out / "report.json")).at("map_hash") ==
+        json::parse(file_text(whole / "report.json")).at("map_hash"));
+  CHECK(file_text(out / "map.vdb") == file_text(whole / "map.vdb"));
 }
 
 TEST_CASE("resuming with another recording or other settings is refused, each named, and the map stays") {
@@ -202,6 +232,67 @@ TEST_CASE("parts of a recording merge, and parts that share frames are refused, 
   CHECK(bad.exit_code == 3);
   CHECK_THAT(bad.err, Catch::Matchers::Contains("2 shared"));
   CHECK(run_feltmap("merge " + even + " " + third + " --allow-shared-frames --out " + merged + "2").exit_code == 0);
+  // As if all of it had been fused, but no run can go on behind two ends.
+  fs::create_directory(folder.path() / "two");
+  fs::copy_file(folder.path() / "merged.vdb", folder.path() / "two" / "map.vdb");
+  const CommandResult two_ends = run_feltmap(reconstruct(boxes(), folder.path() / "two", "--resume"));
+  CHECK(two_ends.exit_code == 4);
+  CHECK_THAT(two_ends.err, Catch::Matchers::Contains("a merged map cannot be continued"));
+}
+
+TEST_CASE("a recording that grew keeps its name: no frame counts twice, and resuming says what happened") {
+  const TemporaryDirectory folder;
+  const fs::path before = boxes_repeated(folder.path() / "before", 1),
+                 after = boxes_repeated(folder.path() / "after", 2), out = folder.path() / "out";
+  REQUIRE(run_feltmap(reconstruct(before, out)).exit_code == 0);
+  const CommandResult resumed = run_feltmap(reconstruct(after, out, "--resume"));
+  CHECK(resumed.exit_code == 3);
+  CHECK_THAT(resumed.err, Catch::Matchers::Contains("grown or changed") && Catch::Matchers::Contains("--frames"));
+  const auto part = [&](const char* name, const char* frames) {
+    REQUIRE(run_feltmap(reconstruct(after, folder.path() / name, std::string("--frames ") + frames)).exit_code == 0);
+    return quoted(folder.path() / name / "map.vdb");
+  };
+  const std::string all = part("all", ":"), rest = part("rest", "12:"), first = quoted(out / "map.vdb"),
+                    to = " --out " + quoted(folder.path() / "merged.vdb");
+  const CommandResult twice = run_feltmap("merge " + first + " " + all + to);
+  CHECK(twice.exit_code == 3);
+  CHECK_THAT(twice.err, Catch::Matchers::Contains("12 shared"));
+  const CommandResult joined = run_feltmap("merge " + first + " " + rest + to);
+  CHECK(joined.exit_code == 0);
+  CHECK_THAT(joined.err, !Catch::Matchers::Contains("warning"));
+  CHECK(run_feltmap("diff " + quoted(folder.path() / "merged.vdb") + " " + all + " --tol 0.05").exit_code == 0);
+}
+
+TEST_CASE("merging warns of the same images with other poses, and of what does not add up to one run") {
+  const TemporaryDirectory folder;
+  const auto part = [&](const fs::path& sequence, const char* name, const char* options) {
+    REQUIRE(run_feltmap(reconstruct(sequence, folder.path() / name, options)).exit_code == 0);
+    return quoted(folder.path() / name / "map.vdb") + " ";
+  };
+  const auto merged = [&](const std::string& maps) {
+    const CommandResult result = run_feltmap("merge --force " + maps + "--out " + quoted(folder.path() / "m.vdb"));
+    CHECK(result.exit_code == 0);
+    return result.err;
+  };
+  // Poses of the same images, a frame later each.
+  const fs::path moved = folder.path() / "moved";
+  fs::copy(boxes(), moved, fs::copy_options::recursive);
+  std::istringstream poses(file_text(boxes() / "poses.txt"));
+  std::ofstream later(moved / "poses.txt");
+  for (std::string line, pose; std::getline(poses, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    const std::string number = line.substr(0, line.find(' '));
+    later << number << (pose.empty() ? line.substr(number.size()) : pose) << '\n';
+    pose = line.substr(number.size());
+  }
+  later.close();
+  const std::string even = part(boxes(), "even", "--frames 0::2"), odd = part(boxes(), "odd", "--frames 1::2");
+  CHECK_THAT(merged(even + odd), !Catch::Matchers::Contains("warning"));
+  CHECK_THAT(merged(even + part(moved, "moved_map", "--frames 0::3")),
+             Catch::Matchers::Contains("same images") && Catch::Matchers::Contains("2 frames count twice"));
+  CHECK_THAT(merged(even + part(boxes(), "squares", "--frames 1::2 --weight inverse-square --max-depth 3")),
+             Catch::Matchers::Contains("weight: \"constant\" and \"inverse-square\"") &&
+                 Catch::Matchers::Contains("max_depth_m: 3.0 and 4.0"));
 }
 
 }  // namespace felt::test

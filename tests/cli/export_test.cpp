@@ -1,3 +1,4 @@
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -278,6 +279,75 @@ TEST_CASE("a class, a box and a segment cut the surface and the grids where they
       run_feltmap("export --force " + quoted(floor.map) + " --mesh " + quoted(ply) + " --segment-at 5,5,5");
   CHECK(missed.exit_code != 0);
   CHECK_THAT(missed.err, Contains("feltmap: error"));
+}
+
+TEST_CASE("points of a part are all vertices that belong to it, and a box holds what lies in it") {
+  const TouchedFloor floor;
+  const fs::path ply = floor.directory.path() / "part.ply", mesh_file = floor.directory.path() / "mesh.ply";
+  const auto points_of = [&](const std::string& options) {
+    const json written = floor.exported(options + " --points " + quoted(ply));
+    const TriangleMesh points = read_mesh(ply);
+    CHECK(points.triangles.empty());
+    CHECK(points.labels.size() == points.positions.size());
+    CHECK(written["points"]["points"] == points.positions.size());
+    return points;
+  };
+  const TriangleMesh whole = points_of("");
+  // Across the surface, between centres of voxels.
+  const Eigen::AlignedBox3f box(Eigen::Vector3f(-0.133f, -0.117f, -0.011f), Eigen::Vector3f(0.0837f, 0.2093f, 0.013f));
+  const std::string in_box = "--box -0.133,-0.117,-0.011,0.0837,0.2093,0.013";
+  const TriangleMesh boxed = points_of(in_box);
+  CHECK(boxed.positions.size() > 50);
+  CHECK(std::ranges::count_if(whole.positions, [&](const Eigen::Vector3f& p) { return box.contains(p); }) ==
+        int64_t(boxed.positions.size()));
+  for (const Eigen::Vector3f& p : boxed.positions) CHECK(box.contains(p));
+  // No vertex belongs to no class here; triangles across the border belong to neither.
+  const size_t wood = points_of("--class wood").positions.size(), ice = points_of("--class ice").positions.size();
+  CHECK(wood + ice == whole.positions.size());
+  CHECK(points_of(in_box + " --class wood").positions.size() + points_of(in_box + " --class ice").positions.size() ==
+        boxed.positions.size());
+  // Beside a mesh, points stay what they are.
+  CHECK(points_of("--class wood --mesh " + quoted(mesh_file)).positions.size() == wood);
+  CHECK(read_mesh(mesh_file).positions.size() <= wood);
+}
+
+TEST_CASE("a part with voxels and without a surface is written empty, and a warning says so") {
+  const TouchedFloor floor;
+  const fs::path ply = floor.directory.path() / "part.ply";
+  for (const std::string what : {"--mesh ", "--points "}) {
+    const CommandResult result = run_feltmap("export --force " + quoted(floor.map) + " " + what + quoted(ply) +
+                                             " --box -0.1,-0.1,0.03,0.1,0.1,0.07");
+    CHECK(result.exit_code == 0);
+    CHECK_THAT(result.err, Contains("part.ply: empty"));
+    CHECK(read_mesh(ply).positions.empty());
+  }
+  CHECK_THAT(run_feltmap("export --force " + quoted(floor.map) + " --mesh " + quoted(ply)).err, !Contains("empty"));
+}
+
+TEST_CASE("values that 16 bits cannot hold keep 32, and a warning says of which grids") {
+  TouchedFloor floor;
+  Map map = load_map(floor.map);
+  Property stiffness, thickness;
+  stiffness.name = "stiffness", thickness.name = "thickness";
+  stiffness.unit = "N/m", thickness.unit = "m";
+  stiffness.priors = {{"wood", {200000, 20000, 50}}, {"ice", {90000, 9000, 50}}};
+  thickness.priors = {{"wood", {2e-6, 1e-7, 50}}, {"ice", {1e-6, 1e-7, 50}}};
+  std::vector<Property> properties = map.properties.properties();
+  properties.push_back(stiffness), properties.push_back(thickness);
+  map.properties = PropertyTable(properties);
+  save_map(map, floor.map);
+  const fs::path whole = floor.directory.path() / "whole.vdb", half = floor.directory.path() / "half.vdb";
+  const std::string grids = " --grids stiffness_mean,thickness_mean,friction_mean";
+  floor.exported("--vdb " + quoted(whole) + grids);
+  const json written = floor.exported("--half --vdb " + quoted(half) + grids);
+  CHECK(written["vdb"]["in_32_bits"] == json({"stiffness_mean", "thickness_mean"}));
+  auto exact = lines_of("stock_vdb_reader", whole), found = lines_of("stock_vdb_reader", half);
+  for (const char* grid : {"stiffness_mean", "thickness_mean"}) CHECK(found.at(grid) == exact.at(grid));
+  for (const int limit : {4, 5})
+    CHECK(std::stod(found["friction_mean"][limit]) == Approx(std::stod(exact["friction_mean"][limit])).epsilon(1e-3));
+  const CommandResult warned =
+      run_feltmap("export --force --half " + quoted(floor.map) + " --vdb " + quoted(half) + grids);
+  CHECK_THAT(warned.err, Contains("'stiffness_mean'") && Contains("32 bits") && !Contains("friction_mean"));
 }
 
 TEST_CASE("a compact VDB holds the chosen grids in 16 bits, for a reader that is not ours") {

@@ -19,23 +19,25 @@ namespace {
 namespace fs = std::filesystem;
 using Catch::Matchers::Contains;
 
-/// A file system in memory of a few hundred kilobytes; `good` is false where mounting is not permitted.
+/// A file system in memory; `good` is false, and the test noted as skipped, where mounting is not permitted.
 class SmallDisk {
 public:
-  SmallDisk(const fs::path& folder, size_t bytes) : folder_(folder) {
+  explicit SmallDisk(const fs::path& folder) : folder_(folder) {
     fs::create_directories(folder);
-    good = mount("tmpfs", folder.c_str(), "tmpfs", 0, ("size=" + std::to_string(bytes)).c_str()) == 0;
-    if (!good) WARN("FELTMAP_SKIP: no small disk can be mounted here: " << std::strerror(errno));
+    good = mount("tmpfs", folder.c_str(), "tmpfs", 0, nullptr) == 0;
+    if (!good) skip(std::string("no small disk can be mounted here: ") + std::strerror(errno));
   }
   ~SmallDisk() {
     if (good) umount2(folder_.c_str(), MNT_DETACH);
   }
-  void make_read_only() const {
-    REQUIRE(mount(nullptr, folder_.c_str(), nullptr, MS_REMOUNT | MS_RDONLY, nullptr) == 0);
-  }
+  void limit(size_t bytes) const { remount(0, "size=" + std::to_string(bytes)); }
+  void make_read_only() const { remount(MS_RDONLY, ""); }
   bool good = false;
 
 private:
+  void remount(unsigned long flags, const std::string& options) const {
+    REQUIRE(mount(nullptr, folder_.c_str(), nullptr, MS_REMOUNT | flags, options.c_str()) == 0);
+  }
   fs::path folder_;
 };
 
@@ -65,12 +67,13 @@ void require_refused(const std::string& arguments, const std::string& reason) {
 TEST_CASE("on a full disk every command that writes fails with the reason and leaves the earlier files as they were") {
   const TemporaryDirectory folder;
   const fs::path disk = folder.path() / "disk", large = folder.path() / "large";
+  const SmallDisk small(disk);
+  if (!small.good) return;
   REQUIRE(run_feltmap(reconstruct(large, "--voxel-size 0.02")).exit_code == 0);
   REQUIRE(run_feltmap(reconstruct(folder.path() / "small", "--voxel-size 0.05")).exit_code == 0);
   size_t bytes = 0;
   for (const auto& entry : fs::directory_iterator(folder.path() / "small")) bytes += entry.file_size();
-  const SmallDisk small(disk, bytes + (64 << 10));
-  if (!small.good) return;
+  small.limit(bytes + (64 << 10));
   REQUIRE(run_feltmap(reconstruct(disk, "--voxel-size 0.05")).exit_code == 0);
   const auto before = files_in(disk);
   REQUIRE(before.size() == 3);
@@ -90,10 +93,53 @@ TEST_CASE("on a full disk every command that writes fails with the reason and le
   CHECK((files_in(disk) == before));
 }
 
+TEST_CASE("the map comes before the mesh where both do not fit, and an earlier mesh stays beside its map") {
+  const TemporaryDirectory folder;
+  const fs::path disk = folder.path() / "disk", other = folder.path() / "other", large = folder.path() / "large";
+  const SmallDisk small(disk), small_too(other);
+  if (!small.good || !small_too.good) return;
+  REQUIRE(run_feltmap(reconstruct(large, "--voxel-size 0.02")).exit_code == 0);
+  REQUIRE(run_feltmap(reconstruct(folder.path() / "small", "--voxel-size 0.05")).exit_code == 0);
+  const auto size_of = [&](const char* file) { return size_t(fs::file_size(large / file)); };
+  size_t held = 0;
+  for (const auto& [name, text] : files_in(folder.path() / "small")) held += text.size();
+  REQUIRE(size_of("mesh.ply") + (128 << 10) < size_of("map.vdb"));
+  {
+    // Room for the mesh and not for the map, which comes first and fails.
+    small.limit(held + size_of("mesh.ply") + (64 << 10));
+    REQUIRE(run_feltmap(reconstruct(disk, "--voxel-size 0.05")).exit_code == 0);
+    const auto before = files_in(disk);
+    for (const char* threads : {"1", "2"}) {
+      const CommandResult result =
+          run_feltmap(reconstruct(disk, "--voxel-size 0.02 --force --threads " + std::string(threads)));
+      INFO(result.err);
+      CHECK(result.exit_code == 4);
+      CHECK_THAT(result.err, Contains("map.vdb") && Contains("No space left on device") && !Contains("--resume"));
+      CHECK((files_in(disk) == before));
+    }
+    // What a run goes on with is still there, and said to be.
+    std::ofstream filler(disk / "filler", std::ios::binary);
+    const std::string piece(4096, 'x');
+    while (filler.write(piece.data(), std::streamsize(piece.size())) && filler.flush()) {
+    }
+    require_refused(reconstruct(disk, "--voxel-size 0.05 --resume"), "the first 12 frames, and --resume goes on");
+    CHECK(file_text(disk / "map.vdb") == before.at("map.vdb"));
+  }
+  // Room for the map and not for the mesh beside it.
+  small_too.limit(size_of("map.vdb") + (64 << 10));
+  for (const char* threads : {"1", "2"}) {
+    require_refused(reconstruct(other, "--voxel-size 0.02 --force --threads " + std::string(threads)),
+                    "the map is saved");
+    CHECK(file_text(other / "map.vdb") == file_text(large / "map.vdb"));
+    CHECK_FALSE(fs::exists(other / "mesh.ply"));
+    fs::remove(other / "map.vdb");
+  }
+}
+
 TEST_CASE("a read-only target is refused before any work, and a map on it is not changed") {
   const TemporaryDirectory folder;
   const fs::path disk = folder.path() / "disk";
-  const SmallDisk small(disk, 16 << 20);
+  const SmallDisk small(disk);
   if (!small.good) return;
   REQUIRE(run_feltmap(reconstruct(disk, "--voxel-size 0.05")).exit_code == 0);
   const auto before = files_in(disk);

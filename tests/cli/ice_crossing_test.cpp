@@ -8,6 +8,7 @@
 
 #include "io/files/atomic_file.h"
 #include "tests/cli/command.h"
+#include "tests/cli/sequences.h"
 #include "tests/support/data.h"
 
 namespace felt::test {
@@ -71,6 +72,28 @@ TEST_CASE("ice that 50 frames call snow or concrete is walked statically after o
         CHECK(friction["gait"]["decision"] == "dynamic");
       }
     }
+  }
+}
+
+TEST_CASE(
+    "however long ice was taken for snow, one touch corrects it, because evidence has a cap unless told otherwise") {
+  const TemporaryDirectory temporary;
+  const std::string folder = temporary.path().string();
+  REQUIRE(run_feltmap("simulate ice_crossing --out " + folder +
+                      "/five --frames 5 --width 60 --height 45 --labels material --errors scene --no-mesh --quiet "
+                      "--network " +
+                      network(folder, "snow"))
+              .exit_code == 0);
+  const std::string long_sequence = repeated(folder + "/five", folder + "/long", 60).string();
+  for (const std::string cap : {"", " --label-cap 0"}) {
+    INFO("reconstruct" << cap);
+    const std::string map = folder + "/out/map.vdb";
+    const json report =
+        answer_of("reconstruct " + long_sequence + " --out " + folder + "/out --voxel-size 0.08 --force --json" + cap);
+    CHECK(report["frames"]["fused"] == 300);
+    const json touched = answer_of("touch " + map + " --at 0,0,0 --property friction --value 0.156 --dry-run --json");
+    CHECK(touched["before"]["class"] == "snow");
+    CHECK(touched["after"]["class"] == (cap.empty() ? "ice" : "snow"));
   }
 }
 

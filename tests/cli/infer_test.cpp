@@ -41,9 +41,9 @@ TEST_CASE("infer answers every line in order and goes on after a faulty one") {
 
 TEST_CASE("infer takes the lines of all three golden files and answers with their numbers") {
   FELTMAP_REQUIRE_DATA(reference, "../reference");
-  const auto dnig = read_json_lines(reference / "dnig_golden.jsonl");
-  const auto material = read_json_lines(reference / "material_golden.jsonl");
-  const auto noise = read_json_lines(reference / "noise_golden.jsonl");
+  const auto dnig = read_json_lines(reference / "dnig_golden.jsonl", 160);
+  const auto material = read_json_lines(reference / "material_golden.jsonl", 80);
+  const auto noise = read_json_lines(reference / "noise_golden.jsonl", 30);
   const CommandResult result =
       run_feltmap("infer", text_of(reference / "dnig_golden.jsonl") + text_of(reference / "material_golden.jsonl") +
                                text_of(reference / "noise_golden.jsonl"));
@@ -103,13 +103,19 @@ TEST_CASE("fitted priors are written as properties that a map takes, beside the 
   CHECK(table[0].rho == Approx(report["rho"].get<double>()));
   CHECK(table[0].priors.at("ice").mean == Approx(0.13));
   CHECK(table[0].priors.at("rock").sd == Approx(report["classes"][2]["sd"].get<double>()));
+  const std::string again = "infer --fit-priors '" + csv.string() + "' --properties-out '" + yaml.string() + "'",
+                    before = text_of(yaml);
+  CHECK(run_feltmap(again).exit_code == 4);
+  CHECK(text_of(yaml) == before);
+  CHECK(run_feltmap(again + " --force").exit_code == 0);
+  CHECK(text_of(yaml) != before);
   CHECK(run_feltmap("infer --fit-priors '" + csv.string() + "' --properties-out /no/such/dir/p.yaml").exit_code == 4);
 }
 
 TEST_CASE("infer in single precision runs the batch kernels on the target it is told, within 1e-3 of the reference") {
   FELTMAP_REQUIRE_DATA(reference, "../reference");
-  const auto dnig = read_json_lines(reference / "dnig_golden.jsonl");
-  const auto material = read_json_lines(reference / "material_golden.jsonl");
+  const auto dnig = read_json_lines(reference / "dnig_golden.jsonl", 160);
+  const auto material = read_json_lines(reference / "material_golden.jsonl", 80);
   const std::string lines = text_of(reference / "dnig_golden.jsonl") + text_of(reference / "material_golden.jsonl");
   for (const std::string& target : simd_names()) {
     INFO(target);
@@ -181,7 +187,9 @@ TEST_CASE("a faulty line names its field and its number, whatever is wrong with 
 }
 
 TEST_CASE("infer refuses a precision or a target that it does not know") {
-  CHECK(run_feltmap("infer --precision f16").exit_code == 2);
+  const CommandResult half = run_feltmap("infer --precision f16");
+  CHECK(half.exit_code == 2);
+  CHECK_THAT(half.err, Catch::Matchers::Contains("f16 not in {f32,f64}"));
   CHECK(run_feltmap("infer --simd sideways").exit_code == 3);
 }
 

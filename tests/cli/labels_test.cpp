@@ -96,6 +96,24 @@ TEST_CASE("a network's confusions are learned and make its labels honest") {
   CHECK_THAT(refused.err, Contains("columns: expected every class, found none for 'sofa'"));
 }
 
+TEST_CASE("what a network's confusions are worth is measured on frames that they were not learned from") {
+  const Recording recording;
+  // Right in even frames: only the odd ones take sofas for floor.
+  for (const char* even : {"0.png", "2.png"}) write_bytes(recording.predicted / even, encode_png(label_image()));
+  const CommandResult learned =
+      run_feltmap("calibrate-labels " + quoted(recording.sequence) + " --labels " + quoted(recording.predicted) +
+                  " --reference-labels " + quoted(recording.sequence / "labels") + " --json --out " +
+                  quoted(recording.folder.path() / "confusion.yaml"));
+  INFO(learned.err);
+  REQUIRE(learned.exit_code == 0);
+  // Of three classes with a third of the pixels each. Learned on even frames every label is sure, and a third of the
+  // odd ones are wrong; learned on odd frames floor has 1/2, and in even ones it always is floor.
+  const json scores = json::parse(learned.out).at("held_out");
+  CHECK(scores.at("ece").get<double>() == Approx((1 / 3.0 + 1 / 6.0) / 2));
+  CHECK(scores.at("brier").get<double>() == Approx((2 / 3.0 + 1 / 6.0) / 2));
+  CHECK(scores.at("nll").get<double>() == Approx((-std::log(1e-12) / 3 + std::log(2) / 3) / 2));
+}
+
 TEST_CASE("label settings come from the command line or the file, are checked, and are kept with the map") {
   const Recording recording;
   const fs::path config = recording.folder.path() / "config.yaml";
@@ -128,7 +146,9 @@ TEST_CASE("label settings come from the command line or the file, are checked, a
   const CommandResult wide = recording.reconstruct("--label-band 4.5");
   CHECK(wide.exit_code == 3);
   CHECK_THAT(wide.err, Contains("--label-band: voxels: expected at most the truncation, 4, found 4.5"));
-  CHECK(recording.reconstruct("--label-band 4.5 --truncation 5vox").exit_code == 0);
+  const CommandResult fits = recording.reconstruct("--label-band 4.5 --truncation 5vox");
+  CHECK(fits.exit_code == 0);
+  CHECK(json::parse(fits.out).at("config").at("label_cap") == 50);  // what a touch can still correct
   const CommandResult unknown = recording.reconstruct("--ignore-classes person");
   CHECK(unknown.exit_code == 3);
   CHECK_THAT(unknown.err, Contains("--ignore-classes") && Contains("wall, floor, sofa"));

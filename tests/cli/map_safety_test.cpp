@@ -1,20 +1,24 @@
 // Nothing that a map holds is lost to a name, a neighbour or a changed input.
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "io/files/file_lock.h"
 #include "io/images/image_encode.h"
 #include "io/map_file/map_file.h"
+#include "mapping/touch/touch_update.h"
 #include "tests/cli/command.h"
 #include "tests/cli/sequences.h"
 #include "tests/support/data.h"
 #include "tests/support/random_map.h"
 #include "tests/support/recorded_sequence.h"
+#include "tests/support/waiting.h"
 
 namespace felt::test {
 namespace {
@@ -35,9 +39,9 @@ struct Recording {
     return run_feltmap("reconstruct " + quoted(sequence) + " --out " + quoted(out) + " --voxel-size 0.05 --quiet " +
                        options);
   }
-  std::string touch(const std::string& value = "0.4") const {
-    return "touch " + quoted(map) + " --sequence " + quoted(sequence) + " --frame 0 --pixel 12,8 --region sphere " +
-           "--radius 0.3 --property friction --value " + value;
+  std::string touch(const std::string& value = "0.4", const fs::path& of = {}) const {
+    return "touch " + quoted(of.empty() ? map : of) + " --sequence " + quoted(sequence) +
+           " --frame 0 --pixel 12,8 --region sphere " + "--radius 0.3 --property friction --value " + value;
   }
 };
 
@@ -111,6 +115,7 @@ TEST_CASE("commands that change one map wait for each other, and none writes int
     const FileLock at_work(recording.out, FileLock::Kind::exclusive, 0);
     refused(recording.touch(), 4, "another feltmap");
     refused("merge " + quoted(recording.map) + " --out " + quoted(recording.map), 4, "another feltmap");
+    refused("export " + quoted(recording.map) + " --vdb " + quoted(recording.out / "copy.vdb"), 4, "another feltmap");
     CHECK(recording.reconstruct("--force").exit_code == 4);
   }
   CHECK(file_text(recording.map) == before);
@@ -138,6 +143,106 @@ TEST_CASE("a touched copy and a merged map replace only what they hold") {
   const fs::path touched = recording.folder.path() / "touched.vdb";
   REQUIRE(run_feltmap(recording.touch() + " --out " + quoted(touched)).exit_code == 0);
   refused(merge + quoted(touched), 4, "1 touches");
+}
+
+TEST_CASE("a part that was cut out of a map does not replace it, although it knows the same frames") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const fs::path part = recording.folder.path() / "part.vdb";
+  REQUIRE(
+      run_feltmap("export " + quoted(recording.map) + " --vdb " + quoted(part) + " --box -3,-3,0,0.4,3,5").exit_code ==
+      0);
+  const std::string whole = file_text(recording.map), merge = "merge " + quoted(part) + " --out ";
+  const size_t lost = active_voxel_count(load_map(recording.map)) - active_voxel_count(load_map(part));
+  REQUIRE(lost > 0);
+  const std::string reason = "a map with " + std::to_string(lost) + " observed voxels that the new one does not hold";
+  refused(merge + quoted(recording.map), 4, reason);
+  refused(recording.touch("0.4", part) + " --out " + quoted(recording.map), 4, reason);
+  CHECK(file_text(recording.map) == whole);
+  CHECK(run_feltmap(merge + quoted(part)).exit_code == 0);
+  CHECK(run_feltmap(merge + quoted(recording.map) + " --force").exit_code == 0);
+}
+
+TEST_CASE("a touched copy that replaces another says which touches are gone") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const fs::path copy = recording.folder.path() / "copy.vdb";
+  const std::string first = recording.touch("0.4") + " --out " + quoted(copy);
+  const auto warns = [](const std::string& arguments) {
+    const CommandResult result = run_feltmap(arguments);
+    INFO(arguments << "\n" << result.err);
+    CHECK(result.exit_code == 0);
+    return result.err.find("not in the map that replaces it") != std::string::npos;
+  };
+  CHECK_FALSE(warns(first));
+  CHECK_FALSE(warns(first));  // the same touch again
+  const std::string id = id_text(load_map(copy).touches.touches.at(0).id);
+  CHECK_FALSE(warns("touch " + quoted(copy) + " --out " + quoted(copy) + " --undo " + id));
+  CHECK_FALSE(warns("touch " + quoted(copy) + " --out " + quoted(copy) + " --redo " + id));
+  CHECK(warns(recording.touch("0.5") + " --out " + quoted(copy)));
+  CHECK(load_map(copy).touches.touches.size() == 1);
+}
+
+TEST_CASE("a map that was made read-only is replaced only with --force") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  fs::permissions(recording.map, fs::perms::owner_read | fs::perms::group_read | fs::perms::others_read);
+  // The superuser may write everywhere, unless that is taken away.
+  const std::string as_user = geteuid() == 0 ? "setpriv --bounding-set=-dac_override,-dac_read_search " : "";
+  if (!as_user.empty() && run_feltmap_within(as_user, "--version").exit_code != 0) {
+    skip("setpriv cannot take the superuser's rights away here");
+    return;
+  }
+  const std::string before = file_text(recording.map);
+  const std::string commands[] = {
+      recording.touch(), "merge " + quoted(recording.map) + " --out " + quoted(recording.map),
+      "reconstruct " + quoted(recording.sequence) + " --out " + quoted(recording.out) + " --voxel-size 0.05 --resume"};
+  for (const std::string& arguments : commands) {
+    const CommandResult result = run_feltmap_within(as_user, arguments);
+    INFO(arguments << "\n" << result.err);
+    CHECK(result.exit_code == 4);
+    CHECK_THAT(result.err, Contains("Permission denied") && Contains("--force"));
+  }
+  CHECK(file_text(recording.map) == before);
+  CHECK(run_feltmap_within(as_user, recording.touch() + " --force").exit_code == 0);
+  CHECK(file_text(recording.map) != before);
+}
+
+TEST_CASE("a command reads the map that it replaces when nobody else is at work on it") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const std::string map = quoted(recording.map);
+  for (const std::string& arguments :
+       {"merge " + map + " --out " + map, "export " + map + " --vdb " + map + " --compact --force"}) {
+    std::future<CommandResult> result;
+    REQUIRE(run_feltmap(recording.touch()).exit_code == 0);
+    {
+      const FileLock at_work(recording.map, FileLock::Kind::exclusive, 0);
+      result = std::async(std::launch::async, [&] { return run_feltmap(arguments); });
+      CHECK(wait_until_feltmap_has_open(recording.out));
+      Map changed = load_map(recording.map);
+      undo_touch(changed, changed.touches.touches.back().id);
+      save_map(changed, recording.map);
+    }
+    const CommandResult done = result.get();
+    INFO(arguments << "\n" << done.err);
+    CHECK(done.exit_code == 0);
+    CHECK_FALSE(load_map(recording.map).touches.any_active());
+  }
+}
+
+TEST_CASE("a run does not replace what came into its folder while it waited for another") {
+  const Recording recording;
+  fs::create_directories(recording.out);
+  std::future<CommandResult> result;
+  {
+    const FileLock at_work(recording.out, FileLock::Kind::exclusive, 0);
+    result = std::async(std::launch::async, [&] { return recording.reconstruct(); });
+    CHECK(wait_until_feltmap_has_open(recording.out));
+    write_text(recording.map, "mine");
+  }
+  CHECK(result.get().exit_code == 4);
+  CHECK(file_text(recording.map) == "mine");
 }
 
 TEST_CASE("a part of a map is not merged with the whole, and no run goes on with it") {
@@ -208,6 +313,25 @@ TEST_CASE("merging keeps the cap of weights that the maps were made with") {
                            " --allow-shared-frames --out " + quoted(recording.folder.path() / "both.vdb");
   refused(both, 3, "--max-weight");
   CHECK(run_feltmap(both + " --max-weight 200").exit_code == 0);
+}
+
+TEST_CASE("merging warns where class evidence depends on the viewpoints of one run") {
+  const Recording recording(6);
+  const auto part = [&](const char* frames, const char* name, const std::string& options) {
+    REQUIRE(recording.reconstruct(options + " --force --frames " + frames).exit_code == 0);
+    const fs::path map = recording.folder.path() / name;
+    fs::copy_file(recording.map, map, fs::copy_options::overwrite_existing);
+    return quoted(map) + " ";
+  };
+  const auto warnings = [&](const std::string& options) {
+    const std::string maps = part("0:3", "a.vdb", options) + part("3:6", "b.vdb", options);
+    const CommandResult result =
+        run_feltmap("merge " + maps + "--force --out " + quoted(recording.folder.path() / "merged.vdb"));
+    CHECK(result.exit_code == 0);
+    return result.err;
+  };
+  CHECK_THAT(warnings(""), !Contains("--label-novelty"));
+  CHECK_THAT(warnings("--label-novelty 1"), Contains("--label-novelty"));
 }
 
 TEST_CASE("merging merged maps keeps every configuration") {

@@ -8,9 +8,13 @@
 #include <set>
 #include <sstream>
 
+#include "io/map_file/map_file.h"
+#include "io/sequence/open_sequence.h"
+#include "mapping/fusion/tsdf_integrator.h"
 #include "tests/cli/command.h"
 #include "tests/cli/sequences.h"
 #include "tests/support/data.h"
+#include "tests/support/recorded_sequence.h"
 
 namespace felt::test {
 namespace {
@@ -43,9 +47,12 @@ TEST_CASE("reconstruct writes a map, a mesh and a report that holds every promis
   CHECK(report.at("voxel_size_m") == 0.02);
   CHECK(report.at("truncation_m") == 0.08);
   CHECK(report.at("blocks") > 100);
+  CHECK(report.at("blocks") == load_map(out.path() / "result/map.vdb").store.size());
   CHECK(report.at("active_voxels") > 512 * 10);
   const json& bytes = report.at("bytes");
-  CHECK(bytes.at("tsdf").get<size_t>() >= 4096 * report.at("blocks").get<size_t>());
+  const size_t tsdf_bytes = bytes.at("tsdf"), voxels = 512 * report.at("blocks").get<size_t>();
+  CHECK(tsdf_bytes >= 8 * voxels);
+  CHECK(tsdf_bytes <= 9 * voxels);  // blocks that were made for a frame and then not observed are in it
   CHECK(bytes.at("total").get<size_t>() == bytes.at("tsdf").get<size_t>() + bytes.at("color").get<size_t>() +
                                                bytes.at("classes").get<size_t>() +
                                                bytes.at("properties").get<size_t>());
@@ -69,6 +76,36 @@ TEST_CASE("reconstruct writes a map, a mesh and a report that holds every promis
   const std::string mesh = file_text(out.path() / "result/mesh.ply");
   CHECK_THAT(mesh, Catch::Matchers::StartsWith("ply\n"));
   CHECK_THAT(mesh, Catch::Matchers::Contains("element vertex " + report["mesh"]["vertices"].dump() + "\n"));
+}
+
+TEST_CASE("the weight, the distance and dropoff_start decide how a frame is fused, as they do in the library") {
+  const TemporaryDirectory folder;
+  const fs::path sequence = folder.path() / "recording", settings = folder.path() / "settings.yaml";
+  write_icl(sequence, 1);
+  write_text(settings, "dropoff_start: 2\n");
+  struct Case {
+    std::string options;
+    IntegrationConfig config;
+  };
+  std::vector<Case> cases = {{"--weight inverse-square --distance optical-axis", {}},
+                             {"--weight sensor-noise --distance tangent-plane", {}},
+                             {"--config " + quoted(settings), {}}};
+  cases[0].config.weight = WeightModel::inverse_square, cases[0].config.distance = DistanceModel::optical_axis;
+  cases[1].config.weight = WeightModel::sensor_noise, cases[1].config.distance = DistanceModel::tangent_plane;
+  cases[2].config.dropoff_start_vox = 2;
+  const auto reader = open_sequence(sequence);
+  std::set<std::string> hashes;
+  for (const Case& c : cases) {
+    INFO(c.options);
+    const CommandResult result = reconstruct(sequence, folder.path() / "out", "--force --json " + c.options);
+    INFO(result.err);
+    REQUIRE(result.exit_code == 0);
+    Map expected(0.02, 0.08);
+    IntegrationScratch scratch;
+    integrate(expected, frame_of(*reader, 0), c.config, scratch);
+    CHECK(json::parse(result.out).at("map_hash") == map_hash(expected));
+    CHECK(hashes.insert(map_hash(expected)).second);
+  }
 }
 
 TEST_CASE("a program that knows only OpenVDB reads the grids of a map") {
@@ -199,7 +236,7 @@ TEST_CASE("a full disk exits with 4 and leaves the earlier result as it was") {
 TEST_CASE("a signal saves what is fused, says so and exits with 5") {
   const TemporaryDirectory folder;
   const fs::path sequence = boxes_repeated(folder.path() / "long", 600), out = folder.path() / "out";
-  for (const char* signal : {"INT", "TERM"}) {
+  for (const char* signal : {"INT", "TERM", "HUP"}) {
     INFO(signal);
     fs::remove_all(out);
     const CommandResult result = run_feltmap_within(
@@ -350,6 +387,23 @@ TEST_CASE("settings of labels that floats or the cap cannot hold are refused") {
     CHECK(result.exit_code == 3);
     CHECK_THAT(result.err, Catch::Contains("expected") && Catch::Contains("found"));
   }
+}
+
+TEST_CASE("the farthest depth is what the user says, else what the recording says") {
+  const TemporaryDirectory folder;
+  const fs::path sequence = folder.path() / "recording";
+  write_generic(sequence, 1);
+  std::ofstream(sequence / "sequence.yaml", std::ios::app) << "max_depth: 80\n";
+  std::ofstream(folder.path() / "c.yaml") << "max_depth: 2\n";
+  const auto max_depth_m = [&](const std::string& options) {
+    const CommandResult result = reconstruct(sequence, folder.path() / "result", "--json --force " + options);
+    INFO(result.err);
+    REQUIRE(result.exit_code == 0);
+    return json::parse(result.out).at("config").at("max_depth_m").get<double>();
+  };
+  CHECK(max_depth_m("") == 80);
+  CHECK(max_depth_m("--max-depth 3") == 3);
+  CHECK(max_depth_m("--config " + quoted(folder.path() / "c.yaml")) == 2);
 }
 
 TEST_CASE("flags of the command line overrule a configuration, also to say no") {

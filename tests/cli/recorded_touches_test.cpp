@@ -103,6 +103,29 @@ TEST_CASE("touches that cannot belong to the sequence are an error before anythi
   CHECK_THAT(no_table.err, Catch::Contains("--properties"));
 }
 
+TEST_CASE("touches that an interrupted map was given by hand do not count twice when its run goes on") {
+  const TemporaryDirectory folder;
+  const std::string out = folder.path().string() + "/map", map_file = out + "/map.vdb";
+  const json whole = reconstructed(room() + " --out " + out);
+  CHECK(whole["touches"]["already_counted"] == 0);
+  // As it would be had the run been stopped behind its last frame, and `touch --file` come before --resume.
+  Map map = load_map(map_file);
+  json progress = json::parse(map.metadata.at("progress"));
+  progress["complete"] = false;
+  progress["touches"] = "";
+  map.metadata["progress"] = progress.dump();
+  save_map(map, map_file);
+  const CommandResult result = run_feltmap("reconstruct " + room() + " --out " + out + " --resume" + kSmall);
+  INFO(result.err);
+  REQUIRE(result.exit_code == 0);
+  CHECK_THAT(result.err, Catch::Contains("4 of 4 touches count already"));
+  const json report = json::parse(result.out);
+  CHECK(report["touches"]["already_counted"] == 4);
+  CHECK(report["touches"]["applied"] == 0);
+  CHECK(report["touches"]["refused"].empty());
+  CHECK(report["map_hash"] == whole["map_hash"]);
+}
+
 TEST_CASE("a recorded touch in free space is refused and counted, the others count") {
   const TemporaryDirectory folder;
   const std::string csv = (folder.path() / "touches.csv").string(), out = (folder.path() / "out").string();

@@ -11,6 +11,7 @@
 #include "tests/support/analytic_map.h"
 #include "tests/support/data.h"
 #include "tests/support/labelled_map.h"
+#include "tests/support/squares.h"
 
 namespace felt::test {
 namespace {
@@ -46,8 +47,9 @@ TEST_CASE("render writes depth in millimetres and an overview that stock readers
 TEST_CASE("render names what it cannot use") {
   const TemporaryDirectory folder;
   const std::string map = wall_map(folder).string();
-  CHECK(run_feltmap("render " + map).exit_code == 3);
-  CHECK(run_feltmap("render " + map + " --pose 1,2,3 --out x").exit_code == 4);
+  CHECK(run_feltmap("render " + map).exit_code == 2);
+  CHECK(run_feltmap("render " + map + " --pose 0,0,0,0,0,0,1").exit_code == 2);
+  CHECK(run_feltmap("render " + map + " --pose 1,2,3 --out x").exit_code == 2);
   const CommandResult classes = run_feltmap("render " + map + " --pose 0,0,0,0,0,0,1 --images class --out x");
   CHECK(classes.exit_code == 3);
   CHECK_THAT(classes.err, Contains("a map with classes"));
@@ -142,6 +144,36 @@ TEST_CASE("evaluate measures a known distance and defines every figure") {
   CHECK(nlohmann::json::parse(culled.out)["reference_seen"].get<double>() == Approx(0.7575 / 0.8).epsilon(0.01));
 }
 
+TEST_CASE("evaluate counts what was seen within the depth that the map was fused with, unless told otherwise") {
+  const TemporaryDirectory folder;
+  Map map(0.02, 0.08);
+  fill_map(map, {-20, -20, 44}, {20, 20, 56}, [](const Eigen::Vector3d& p) { return 1.0 - p.z(); });
+  const std::string any_depth = wall_map(folder).string(), near = (folder.path() / "near.vdb").string();
+  record_frame(map.frames, "recording", R"({"min_depth_m": 0.1, "max_depth_m": 1.5})", 0);
+  save_map(map, near);
+  const std::string reference = (folder.path() / "reference.ply").string(),
+                    poses = (folder.path() / "poses.txt").string();
+  write_mesh(reference, both(square(0, 1, 1), square(1, 1, 2)));
+  std::ofstream(poses) << "1 0.5 0 0 0 0 1\n";
+  const auto evaluate = [&](const std::string& input, const std::string& options) {
+    const CommandResult result =
+        run_feltmap("evaluate " + input + " --reference-mesh " + reference + " --trajectory " + poses +
+                    " --intrinsics 100,100,159.5,119.5 --size 320x240 --samples 3000 --json " + options);
+    INFO(result.err);
+    REQUIRE(result.exit_code == 0);
+    return nlohmann::json::parse(result.out);
+  };
+  CHECK(evaluate(any_depth, "")["reference_seen"] == 1);
+  CHECK(evaluate(near, "")["reference_seen"].get<double>() == Approx(0.5).epsilon(0.01));
+  CHECK(evaluate(near, "--max-depth 3")["reference_seen"] == 1);
+  CHECK(evaluate(near, "--min-depth 1.2 --max-depth 3")["reference_seen"].get<double>() == Approx(0.5).epsilon(0.01));
+
+  const std::string more = (folder.path() / "more.ply").string();
+  write_mesh(more, both(square(0, 1, 1), square(20, 1, 1)));
+  CHECK(evaluate(more, "")["reconstruction_seen"] == 1);
+  CHECK(evaluate(more, "--cull-reconstruction")["reconstruction_seen"].get<double>() == Approx(0.5).epsilon(0.01));
+}
+
 TEST_CASE(
     "evaluate measures the labels of a stored scene, its calibration and its forecasts, and defines every figure") {
   const TemporaryDirectory folder;
@@ -189,10 +221,39 @@ TEST_CASE(
   CHECK(views["views"][0].size() == 8);
 }
 
+TEST_CASE(
+    "evaluate reads forecasts where a touch finds its contact, also where the weight of frames depends on depth") {
+  const TemporaryDirectory folder;
+  const std::string room = (source_dir() / "data" / "scenes" / "room").string();
+  const std::string out = (folder.path() / "out").string(), untouched = (folder.path() / "touches.csv").string();
+  std::ofstream(untouched) << "frame,x,y,z,property,value,sigma\n";
+  // A frame so far away weighs less than the 1 that is asked of a voxel elsewhere.
+  REQUIRE(run_feltmap("reconstruct " + room + " --out " + out + " --weight inverse-square --frames 14:15 --quiet" +
+                      " --touches " + untouched)
+              .exit_code == 0);
+  const CommandResult result = run_feltmap("evaluate " + out + "/map.vdb --reference-readings " + room +
+                                           "/touches.csv --properties " + room + "/properties.yaml --json");
+  INFO(result.err);
+  REQUIRE(result.exit_code == 0);
+  const auto properties = nlohmann::json::parse(result.out)["properties"];
+  CHECK(properties["friction"]["readings"] == 3);
+  CHECK(properties["refused"]["not on a labelled surface"] == 1);  // the one that this frame does not see
+}
+
+TEST_CASE("render says where nothing of what it was asked for is coloured") {
+  const TemporaryDirectory folder;
+  const CommandResult result = run_feltmap("render " + wall_map(folder).string() +
+                                           " --pose 0,0,0,0,0,0,1 --intrinsics 60,60,15.5,11.5 --size 32x24 " +
+                                           "--colored --out " + (folder.path() / "views").string());
+  CHECK(result.exit_code == 0);
+  CHECK_THAT(result.err, Contains("--colored: nothing to colour"));
+}
+
 TEST_CASE("evaluate without a reference, and with one that is no mesh, says so") {
   const TemporaryDirectory folder;
   const std::string map = wall_map(folder).string();
-  CHECK(run_feltmap("evaluate " + map).exit_code == 3);
+  CHECK(run_feltmap("evaluate " + map).exit_code == 2);
+  CHECK(run_feltmap("export " + map).exit_code == 2);
   const CommandResult unlabelled = run_feltmap("evaluate " + map + " --reference-labels " +
                                                (source_dir() / "data" / "scenes" / "table_wall" / "truth").string());
   CHECK(unlabelled.exit_code == 3);
@@ -202,6 +263,15 @@ TEST_CASE("evaluate without a reference, and with one that is no mesh, says so")
       run_feltmap("evaluate " + map + " --reference-mesh " + (folder.path() / "bad.ply").string());
   CHECK(bad.exit_code == 4);
   CHECK_THAT(bad.err, Contains("bad.ply") && Contains("expected ply"));
+  const std::string poses = (folder.path() / "poses.txt").string();
+  std::ofstream(poses) << "0 0 0 0 0 0 1\n";
+  for (const char* half : {"--intrinsics 60,60,15.5,11.5", "--size 32x24"}) {
+    INFO(half);
+    const CommandResult unsized =
+        run_feltmap("evaluate " + map + " --reference-mesh x.ply --trajectory " + poses + " " + half);
+    CHECK(unsized.exit_code == 3);
+    CHECK_THAT(unsized.err, Contains("expected --intrinsics and --size"));
+  }
 }
 
 TEST_CASE("pictures of a map with one class are of one colour, and pixels without surface are white") {
@@ -229,6 +299,8 @@ TEST_CASE("depth beyond what 16 bits of millimetres hold is counted") {
   INFO(result.err);
   REQUIRE(result.exit_code == 0);
   CHECK(nlohmann::json::parse(result.out)["depth_pixels_too_far"] > 100);
+  CHECK(nlohmann::json::parse(result.out)["out"] == out);
+  CHECK_THAT(result.err, !Contains("--colored"));
   CHECK_THAT(result.err, Contains("beyond 65.535 m"));
 }
 

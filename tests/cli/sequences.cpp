@@ -24,26 +24,32 @@ const fs::path& boxes() {
   return sequence;
 }
 
-fs::path boxes_repeated(const fs::path& folder, int rounds) {
-  fs::create_directories(folder);
-  fs::copy(boxes() / "sequence.yaml", folder / "sequence.yaml");
-  for (const char* channel : {"color", "depth"}) {
-    fs::create_directory(folder / channel);
-    for (const auto& image : fs::directory_iterator(boxes() / channel)) {
-      const int number = std::stoi(image.path().stem().string());
-      for (int round = 0; round < rounds; ++round)
-        fs::create_symlink(
-            image.path(), folder / channel / (std::to_string(number + 12 * round) + image.path().extension().string()));
-    }
-  }
-  std::ifstream recorded(boxes() / "poses.txt");
+fs::path repeated(const fs::path& recording, const fs::path& folder, int rounds) {
+  std::ifstream recorded(recording / "poses.txt");
   std::vector<std::string> poses;
   for (std::string line; std::getline(recorded, line);)
     if (!line.empty() && line[0] != '#') poses.push_back(line.substr(line.find(' ')));
-  REQUIRE(poses.size() == 12);
+  const int frames = int(poses.size());
+  REQUIRE(frames > 0);
+  fs::create_directories(folder);
+  for (const char* name : {"sequence.yaml", "classes.yaml", "properties.yaml"})
+    if (fs::exists(recording / name)) fs::copy(recording / name, folder / name);
+  for (const char* channel : {"color", "depth", "labels"}) {
+    if (!fs::exists(recording / channel)) continue;
+    fs::create_directory(folder / channel);
+    for (const auto& image : fs::directory_iterator(recording / channel)) {
+      const int number = std::stoi(image.path().stem().string());
+      for (int round = 0; round < rounds; ++round)
+        fs::create_symlink(
+            image.path(),
+            folder / channel / (std::to_string(number + frames * round) + image.path().extension().string()));
+    }
+  }
   std::ofstream all(folder / "poses.txt");
-  for (int i = 0; i < 12 * rounds; ++i) all << i << poses[size_t(i % 12)] << '\n';
+  for (int i = 0; i < frames * rounds; ++i) all << i << poses[size_t(i % frames)] << '\n';
   return folder;
 }
+
+fs::path boxes_repeated(const fs::path& folder, int rounds) { return repeated(boxes(), folder, rounds); }
 
 }  // namespace felt::test

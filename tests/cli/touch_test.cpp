@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -18,11 +20,11 @@ namespace {
 
 using nlohmann::json;
 
-/// A floor of what vision takes for snow beside one of wood (x > 0), saved.
-std::string save_floor(const TemporaryDirectory& folder) {
+/// A floor of what vision takes for snow, `counts` times, beside one of wood (x > 0), saved.
+std::string save_floor(const TemporaryDirectory& folder, float counts = 20) {
   Map map = labelled_map(
       0.02, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
-      class_table({"wood", "snow", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 0; }, 20);
+      class_table({"wood", "snow", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 1 : 0; }, counts);
   map.properties = read_properties(felt::test::source_dir().string() + "/data/properties.yaml");
   const std::string path = (folder.path() / "map.vdb").string();
   save_map(map, path);
@@ -79,13 +81,64 @@ TEST_CASE("one touch makes a slippery floor known, and undoing it gives the file
   CHECK(touched["map_hash"] == map_hash(load_map(map)));
 }
 
+TEST_CASE("a surface whose observations weigh less than 1 can be touched where weights fall with depth") {
+  const TemporaryDirectory folder;
+  const std::string file = save_floor(folder);
+  const std::string touch = "touch " + file + " --at=-0.2,0,0 --property friction --value 0.139 --dry-run";
+  for (const char* weight : {"constant", "inverse-square", "sensor-noise"}) {
+    Map map = load_map(file);
+    for (Block& block : map.store.blocks())
+      for (float& w : block.geometry->weight) w = std::min(w, 0.05f);
+    map.frames = {};
+    record_frame(map.frames, "recording", json{{"weight", weight}}.dump(), 0);
+    save_map(map, file);
+    INFO(weight);
+    CHECK(run_feltmap(touch).exit_code == (std::string(weight) == "constant" ? 4 : 0));
+  }
+}
+
+TEST_CASE("a query answers between voxel centres, and its figures of a forecast agree with each other") {
+  const TemporaryDirectory folder;
+  const std::string query = "query " + save_floor(folder) + " --at=0.013,0.007,0.031";
+  const json point = ask(query)["points"][0];
+  CHECK(point["signed_distance_m"].get<double>() == Approx(0.031).epsilon(1e-5));
+  const json friction = point["properties"]["friction"];
+  const auto quantile = [&](const char* level) { return friction["quantiles"][level].get<double>(); };
+  CHECK(friction["cvar"]["lower_0.05"].get<double>() < quantile("0.05"));
+  CHECK(quantile("0.05") < quantile("0.25"));
+  CHECK(quantile("0.25") < quantile("0.5"));
+  CHECK(quantile("0.05") < friction["mean"].get<double>());
+  CHECK(friction["mean"].get<double>() < quantile("0.95"));
+  CHECK(quantile("0.95") < friction["cvar"]["upper_0.95"].get<double>());
+  for (const double level : {0.05, 0.95}) {
+    const std::string value = friction["quantiles"][json(level).dump()].dump();
+    const json below = ask(query + " --below=" + value)["points"][0]["properties"]["friction"]["below"];
+    CHECK(below["probability"].get<double>() == Approx(level).epsilon(1e-6));
+  }
+}
+
+TEST_CASE("the error of a forecast is that of the mean that a query gives there") {
+  const TemporaryDirectory folder;
+  const std::string map = save_floor(folder), csv = (folder.path() / "held_out.csv").string();
+  write_file_atomically(csv, "stamp,x,y,z,property,value\n1,-0.2,0,0,friction,0.3\n");
+  const json scores = ask("evaluate " + map + " --reference-readings " + csv)["properties"]["friction"];
+  const json query = ask("query " + map + " --at=-0.2,0,0")["points"][0];
+  CHECK(scores["readings"] == 1);
+  CHECK(scores["mae"].get<double>() ==
+        Approx(std::abs(query["properties"]["friction"]["mean"].get<double>() - 0.3)).epsilon(1e-9));
+}
+
 TEST_CASE("recorded touches are applied all or none, into another file if told so") {
   const TemporaryDirectory folder;
   const std::string map = save_floor(folder), before = bytes_of(map), out = (folder.path() / "out.vdb").string(),
                     csv = (folder.path() / "touches.csv").string();
   write_file_atomically(csv,
                         "stamp,x,y,z,property,value,sigma\n1,-0.2,0,0,friction,0.17,0.01\n2,0.2,0,0,friction,0.36,\n");
+  CHECK_FALSE(ask("touch " + map + " --file " + csv + " --out " + out + " --dry-run").contains("out"));
   const json touched = ask("touch " + map + " --file " + csv + " --out " + out);
+  CHECK(touched["map"] == map);
+  CHECK(touched["out"] == out);
+  CHECK(touched["map_hash"] == map_hash(load_map(out)));
   CHECK(touched["touches"].size() == 2);
   CHECK(load_map(out).touches.touches.size() == 2);
   CHECK(bytes_of(map) == before);
@@ -94,6 +147,42 @@ TEST_CASE("recorded touches are applied all or none, into another file if told s
   CHECK(result.exit_code == 4);
   CHECK_THAT(result.err, Catch::Contains("touches.csv:3") && Catch::Contains("outside the map"));
   CHECK(bytes_of(map) == before);
+}
+
+TEST_CASE("a touch reports how surprising its reading is, as far as its noise leaves it so") {
+  const TemporaryDirectory folder;
+  const std::string file = save_floor(folder), at = "touch " + file + " --at=-0.2,0,0 --property friction --dry-run";
+  Map map = load_map(file);
+  TouchRequest request;
+  request.point_m = {-0.2, 0, 0};
+  request.property = "friction";
+  request.value = 0.139;
+  const TouchEffect effect = apply_touch(map, resolve_touch(map, request));
+  // ln sum_c pi(c) p(reading | c): the density of the reading before it was known.
+  CHECK(ask(at + " --value 0.139")["surprise"].get<double>() ==
+        Approx(log_pdf(effect.before.next_reading[0], 0.139)).epsilon(1e-6));
+  CHECK(ask(at + " --value 0.139 --model mixture")["surprise"].is_number());
+
+  const json precise = ask(at + " --value 1.2"), vague = ask(at + " --value 1.2 --sigma 3");
+  CHECK(precise["flags"]["surprising"] == true);
+  CHECK(vague["flags"]["surprising"] == false);
+  CHECK(vague["flags"]["not_one_material"] == false);
+  CHECK(vague["tail_probability"].get<double>() > precise["tail_probability"].get<double>());
+  CHECK_THAT(run_feltmap(at + " --value 1.2").out, Catch::Contains("no class explains this reading"));
+  CHECK_THAT(run_feltmap(at + " --value 1.2 --sigma 3").out,
+             !Catch::Contains("no class explains") && !Catch::Contains("more than one material"));
+}
+
+TEST_CASE("classes that a property says nothing of are named in one warning") {
+  const TemporaryDirectory folder;
+  const std::string map = save_floor(folder, 2), properties = (folder.path() / "ice.yaml").string();
+  write_file_atomically(properties, "friction:\n  priors:\n    ice: {mean: 0.192, sd: 0.046, readings: 50}\n");
+  const std::string said =
+      run_feltmap("touch " + map + " --at=-0.2,0,0 --property friction --value 0.2 --dry-run --properties " +
+                  properties)
+          .out;
+  CHECK_THAT(said, Catch::Contains("warning: no prior of friction for wood, snow: the other classes share"));
+  CHECK(said.find("no prior") == said.rfind("no prior"));
 }
 
 TEST_CASE("what cannot be touched is refused with one line and leaves the file alone") {
@@ -236,6 +325,9 @@ TEST_CASE("the friction command prints a touch line") {
   CHECK(answer["kinetic"]["mean"].get<double>() == Approx(0.3).epsilon(0.01));
   CHECK_THAT(answer["touch"].get<std::string>(), Catch::Contains("1,2,3,friction,0.3"));
   CHECK_THAT(bytes_of(plot), Catch::Contains("<svg"));
+  const std::string fill_in = "fill in x,y,z, the contact point in the map, or give --at";
+  CHECK_THAT(run_feltmap("friction " + log + " --cutoff 5").out, Catch::Contains(fill_in));
+  CHECK_THAT(run_feltmap("friction " + log + " --cutoff 5 --at 1,2,3").out, !Catch::Contains(fill_in));
   CHECK_THAT(answer["normal_from"].get<std::string>(), Catch::Contains("assumed"));
   const auto refused = [&](const std::string& text, const std::string& reason) {
     write_file_atomically(log, text);

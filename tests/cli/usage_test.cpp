@@ -1,7 +1,10 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "tests/cli/command.h"
+#include "tests/support/data.h"
 
 namespace felt::test {
 
@@ -39,6 +42,82 @@ TEST_CASE("an unknown command is named beside those there are") {
   CHECK_THAT(result.err, Catch::Matchers::StartsWith("feltmap: error: 'frobnicate': expected one of reconstruct, ") &&
                              Catch::Matchers::EndsWith(" (see feltmap --help)\n"));
   CHECK_THAT(result.err, Catch::Matchers::Contains("friction"));
+}
+
+TEST_CASE("an option that is nearly one of the command's is answered with that one") {
+  for (const char* arguments : {"reconstruct x --out y --voxelsize 3", "reconstruct x --voxelsize=3"}) {
+    INFO(arguments);
+    const CommandResult result = run_feltmap(arguments);
+    CHECK(result.exit_code == 2);
+    CHECK(result.err ==
+          "feltmap: error: reconstruct: option: expected '--voxel-size', found '--voxelsize' (see feltmap --help)\n");
+  }
+  CHECK_THAT(run_feltmap("touch map.vdb --fil x").err, Catch::Matchers::Contains("expected '--file', found '--fil'"));
+  const CommandResult unlike = run_feltmap("reconstruct x --out y --zzzzzzzz 3");
+  CHECK(unlike.exit_code == 2);
+  CHECK_THAT(unlike.err, Catch::Matchers::Contains("--zzzzzzzz") && !Catch::Matchers::Contains("expected '"));
+}
+
+TEST_CASE("a choice that there is not is answered with those that there are") {
+  const CommandResult result = run_feltmap("reconstruct x --out y --distance 1");
+  CHECK(result.exit_code == 2);
+  CHECK_THAT(result.err, Catch::Matchers::Contains("--distance: 1 not in {optical-axis,ray,tangent-plane}"));
+}
+
+TEST_CASE("a switch that is neither on nor off is named") {
+  for (const char* value : {"maybe", "99999999999999999999"}) {
+    const CommandResult result = run_feltmap(std::string("reconstruct x --out y --bgr=") + value);
+    CHECK(result.exit_code == 2);
+    CHECK_THAT(result.err, Catch::Matchers::Contains(std::string("--bgr: expected true or false, found '") + value));
+  }
+}
+
+TEST_CASE("help names what is given, shows defaults that hold, and examples whose files are there") {
+  const auto help = [](const std::string& command) { return run_feltmap(command + " --help").out; };
+  using Catch::Matchers::Contains;
+  for (const char* command : {"touch", "region", "query", "suggest", "export", "render", "verify"}) {
+    INFO(command);
+    CHECK_THAT(help(command), Contains(std::string("feltmap ") + command + " [OPTIONS] MAP") && !Contains("Excludes"));
+  }
+  CHECK_THAT(help("friction"), Contains("[OPTIONS] LOG"));
+  CHECK_THAT(help("touch"), Contains("--intrinsics FLOAT x 4 or 6"));
+  CHECK_THAT(help("infer"), Contains("--precision TEXT:{f32,f64}=f64"));
+  const std::string reconstruct = help("reconstruct");
+  CHECK_THAT(reconstruct, Contains("--vote TEXT:{geometric,instances,none}=none"));
+  for (const char* shown :
+       {"measured along [ray]", "measurement [constant]", "weight [255]", "a frame, seconds [0.02]"})
+    CHECK_THAT(reconstruct, Contains(shown));
+  CHECK_THAT(help("evaluate"), !Contains("525") && !Contains("640x480") && Contains("required where --trajectory"));
+  CHECK_THAT(help("render"), Contains("--size TEXT=640x480"));
+  const std::string network = "data/confusion/ice_is_snow.csv";
+  CHECK_THAT(help("simulate"), Contains("--network " + network));
+  CHECK(std::filesystem::exists(source_dir() / network));
+}
+
+TEST_CASE("the doctor accuses none of the sequences that simulate makes") {
+  const test::TemporaryDirectory folder;
+  // Few views that hardly overlap, along plain walls and without noise: what a search for faults can be misled by.
+  for (const std::string scene : {"room1 --frames 5", "room1 --frames 3 --trajectory orbit", "room3 --frames 4",
+                                  "boxes --frames 6 --trajectory sweep", "door --frames 6 --trajectory orbit"}) {
+    INFO(scene);
+    const std::string sequence = (folder.path() / "made").string();
+    REQUIRE(
+        run_feltmap("simulate " + scene + " --width 160 --height 120 --no-mesh --force --out " + sequence).exit_code ==
+        0);
+    const CommandResult result = run_feltmap("doctor " + sequence);
+    INFO(result.out);
+    CHECK(result.exit_code == 0);
+  }
+}
+
+TEST_CASE("doctor examines the frames that were asked for") {
+  const CommandResult result =
+      run_feltmap("doctor " + (source_dir() / "data/scenes/room").string() + " --frames 3:8 --json");
+  INFO(result.err);
+  const nlohmann::json json = nlohmann::json::parse(result.out);
+  CHECK(json["frames"] == 24);
+  CHECK(json["selected_frames"] == 5);
+  CHECK(json["sampled_frames"] == 5);
 }
 
 TEST_CASE("help that cannot be written is an error of output") {

@@ -12,6 +12,26 @@
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+namespace {
+
+/// Everything equal, but numbers that are not whole within 1e-6 of 1 or of their size: entropies and probabilities come
+/// from functions of the standard library, which round as they like.
+void check_summary(const json& found, const json& expected) {
+  const json a = found.flatten(), b = expected.flatten();
+  REQUIRE(b.contains("/map_hash"));
+  CHECK(a.size() == b.size());
+  for (const auto& [key, value] : b.items()) {
+    INFO(key);
+    REQUIRE(a.contains(key));
+    if (value.is_number_float())
+      CHECK(a.at(key).get<double>() == Approx(value.get<double>()).epsilon(1e-6).margin(1e-6));
+    else
+      CHECK(a.at(key) == value);
+  }
+}
+
+}  // namespace
+
 TEST_CASE("the stored scenes give the expected maps") {
   const felt::test::TemporaryDirectory directory;
   const fs::path root = felt::test::source_dir(), expected = root / "data" / "expected";
@@ -27,8 +47,8 @@ TEST_CASE("the stored scenes give the expected maps") {
                                  << felt::to_text(d) << "If this is meant: scripts/approve --yes");
     CHECK_FALSE(felt::beyond(d, 0));
     CHECK(d.same_hash);
-    CHECK(json::parse(std::ifstream(entry.path() / "summary.json")) ==
-          json::parse(std::ifstream(made / "summary.json")));
+    check_summary(json::parse(std::ifstream(made / "summary.json")),
+                  json::parse(std::ifstream(entry.path() / "summary.json")));
     ++scenes;
   }
   CHECK(scenes == 3);

@@ -123,6 +123,29 @@ TEST_CASE("a pixel's probabilities add one unit of evidence however many classes
   }
 }
 
+TEST_CASE("classes cost what was seen of them and not what the table holds") {
+  Random random(12);
+  Frame hard = labelled_frame(random, 6), soft = ball_before_wall(jittered_pose(random));
+  ProbabilityImage& p = soft.probabilities;
+  p.width = soft.depth_m.width(), p.height = soft.depth_m.height(), p.top = 2;
+  for (size_t i = 0; i < soft.depth_m.size(); ++i) {
+    p.class_id.insert(p.class_id.end(), {6, 12});
+    p.probability.insert(p.probability.end(), {0.5f, 0.25f});
+  }
+  for (const Frame* frame : {&hard, &soft}) {
+    std::vector<size_t> bytes;
+    for (const int k : {8, 150}) {
+      Map map(0.03, 0.12);
+      map.classes = table(k);
+      IntegrationScratch scratch;
+      REQUIRE(integrate(map, *frame, {}, scratch).labels.voxels > 500);
+      bytes.push_back(class_bytes(map));
+      CHECK(bytes.back() >= map.store.plane_bytes() / 2);
+    }
+    CHECK(bytes[0] == bytes[1]);
+  }
+}
+
 TEST_CASE("capped evidence forgets the past and keeps its total") {
   Map map(0.03, 0.12);
   map.classes = table(2);

@@ -1,10 +1,14 @@
 #include "mapping/maps/merge.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <map>
+#include <random>
 
 #include "core/error.h"
 #include "mapping/fusion/tsdf_integrator.h"
 #include "mapping/maps/map_diff.h"
+#include "tests/support/labelled_map.h"
 #include "tests/support/random_map.h"
 #include "tests/support/views.h"
 
@@ -40,6 +44,27 @@ void add_labels(Map& map, uint64_t seed) {
       block.evidence.push_back({slot, plane});
     }
   }
+}
+
+/// A map whose blocks all of `random_votes` have, each with even evidence and instances of its own, or without.
+Map random_votes(uint64_t seed) {
+  Map map = test::random_map({.seed = 4, .blocks = 8, .classes = 2, .shared_evidence = true, .instances = true});
+  std::mt19937_64 engine(seed);
+  for (const uint32_t number : map.store.sorted()) {
+    Block& block = map.store[number];
+    if (engine() % 3 == 0) block.even_evidence = nullptr;
+    if (engine() % 3 == 0) block.instance = nullptr;
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      if (!(block.geometry->weight[i] > 0)) continue;
+      if (block.even_evidence != nullptr) block.even_evidence->value[i] = float(engine() % 100) / 8;
+      // Few ids, so that maps agree now and then; votes without a lead, too.
+      if (block.instance != nullptr) {
+        block.instance->id[i] = uint16_t(engine() % 4);
+        block.instance->votes[i] = block.instance->id[i] == 0 ? uint16_t(0) : uint16_t(engine() % 6);
+      }
+    }
+  }
+  return map;
 }
 
 double max_difference(const MapDifference& d, const std::string& name) {
@@ -89,6 +114,40 @@ TEST_CASE("merged evidence is the sum of the parts, plane by plane") {
   CHECK(compared > 1000);
 }
 
+TEST_CASE("even evidence is added, and of the parts' instances the one with most votes stays, with its lead") {
+  const Map parts[] = {random_votes(1), random_votes(2), random_votes(3)};
+  const Map* const pointers[] = {&parts[0], &parts[1], &parts[2]};
+  const Map merged = merge(pointers, {.allow_shared_frames = true});
+  size_t even = 0, agreed = 0, disputed = 0, tied = 0;
+  for (const Block& block : merged.store.blocks())
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      double even_sum = 0;
+      std::map<int, int> votes;
+      int all = 0;
+      for (const Map& part : parts) {
+        const Block& from = *part.store.get(block.coord);
+        if (from.even_evidence != nullptr) even_sum += double(from.even_evidence->value[i]);
+        if (from.instance == nullptr || from.instance->id[i] == 0) continue;
+        votes[from.instance->id[i]] += from.instance->votes[i];
+        all += from.instance->votes[i];
+      }
+      int id = 0, most = 0;
+      for (const auto& [candidate, count] : votes)
+        if (id == 0 || count > most) id = candidate, most = count;
+      const int lead = std::max(0, most - (all - most));
+      CAPTURE(i, id, most, all);
+      REQUIRE((block.even_evidence == nullptr ? 0 : double(block.even_evidence->value[i])) == even_sum);
+      REQUIRE((block.instance == nullptr ? 0 : int(block.instance->id[i])) == id);
+      REQUIRE((block.instance == nullptr ? 0 : int(block.instance->votes[i])) == lead);
+      even += even_sum > 0, agreed += votes.size() == 1, disputed += lead > 0 && lead < most;
+      tied += lead == 0 && most > 0;
+    }
+  CHECK(even > 1000);
+  CHECK(agreed > 500);
+  CHECK(disputed > 100);
+  CHECK(tied > 30);
+}
+
 TEST_CASE("the order of the maps does not change a bit of the merged map") {
   Map a = fused(0, 3), b = fused(1, 3), c = fused(2, 3);
   add_labels(a, 1);
@@ -129,6 +188,40 @@ TEST_CASE("maps that share frames are refused unless that is allowed") {
   CHECK_THROWS_WITH(merge(pointers), Contains("2 shared") && Contains("of map 1") && Contains("recording"));
   const Map twice = merge(pointers, {.allow_shared_frames = true});
   CHECK(frame_count(twice.frames) == 10);
+}
+
+TEST_CASE("frames of the same images with other poses are counted, those of other images or other numbers are not") {
+  const std::string images = "0123456789abcdef", others = "fedcba9876543210";
+  FrameJournal a, b;
+  for (const int64_t i : {0, 1, 2, 3}) record_frame(a, images + others, "", i);
+  for (const int64_t i : {2, 3, 4}) record_frame(b, images + images, "", i);
+  record_frame(b, images + images, "other settings", 3);
+  record_frame(b, others + others, "", 0);
+  CHECK(frames_of_same_images(a, b) == 2);
+  CHECK(frames_of_same_images(b, a) == 2);
+  CHECK(frames_of_same_images(a, a) == 0);  // shared frames, which are refused
+  CHECK(shared_frames(a, b).empty());
+}
+
+TEST_CASE("a property table that continues another merges with it, and where two differ the property is named") {
+  const auto property = [](const char* name) {
+    Property p;
+    p.name = name;
+    return p;
+  };
+  Map a(0.02, 0.08), b(0.02, 0.08), c(0.02, 0.08);
+  a.properties = PropertyTable({property("friction")});
+  b.properties = PropertyTable({property("friction"), property("stiffness")});
+  const Map *const pointers[] = {&c, &a, &b}, *const other[] = {&b, &c, &a};
+  CHECK(merge(pointers).properties == b.properties);
+  CHECK(merge(other).properties == b.properties);
+
+  Property stiffness = property("stiffness");
+  stiffness.unit = "N/m";
+  c.properties = PropertyTable({property("friction"), stiffness});
+  CHECK_THROWS_WITH(merge(pointers), Contains("property table") && Contains("'stiffness' has another unit"));
+  c.properties = PropertyTable({property("stiffness")});
+  CHECK_THROWS_WITH(merge(pointers), Contains("property 1 is 'friction' and 'stiffness'"));
 }
 
 TEST_CASE("every reason why maps cannot be merged is named at once") {
@@ -177,4 +270,25 @@ TEST_CASE("evidence beyond the cap is brought down to it, all classes of a voxel
   }
   CHECK(cut > 1000);
   CHECK(kept > 1000);
+}
+
+TEST_CASE("even evidence counts for the cap and is brought down with that of the classes") {
+  const Map a = random_votes(1), b = random_votes(2);
+  const Map* const pointers[] = {&a, &b};
+  const Map free = merge(pointers, {.allow_shared_frames = true}),
+            capped = merge(pointers, {.allow_shared_frames = true, .max_evidence = 5});
+  size_t cut = 0, only_by_even = 0;
+  for (const Block& from : free.store.blocks()) {
+    const Block& to = *capped.store.get(from.coord);
+    for (int i = 0; i < kBlockVoxels; ++i) {
+      const double before = test::total_evidence(from, i), after = test::total_evidence(to, i);
+      REQUIRE(after == Approx(std::min(before, 5.0)));
+      if (from.even_evidence == nullptr || before == 0) continue;
+      const double even = double(from.even_evidence->value[i]);
+      REQUIRE(double(to.even_evidence->value[i]) == Approx(even * after / before));
+      cut += before > 5, only_by_even += before > 5 && before - even < 5;
+    }
+  }
+  CHECK(cut > 1000);
+  CHECK(only_by_even > 100);
 }

@@ -61,6 +61,17 @@ void for_each_neighbour(const Index3& v, const Visit& visit) {
     if (n != 13) visit(Index3{v.x + n / 9 - 1, v.y + n / 3 % 3 - 1, v.z + n % 3 - 1});
 }
 
+/// The plane that fits the 27 voxels around one.
+SurfacePlane plane_at(const Map& map, const Index3& v, float min_weight) {
+  SurfaceTile tile;
+  for (int n = 0; n < 27; ++n) {
+    const Index3 d{n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
+    const auto voxel = voxel_at(map, {v.x + d.x, v.y + d.y, v.z + d.z}, min_weight);
+    tile.tsdf[SurfaceTile::index(d.x, d.y, d.z)] = voxel ? voxel->tsdf : std::numeric_limits<float>::quiet_NaN();
+  }
+  return fitted_plane(tile, SurfaceTile::index(0, 0, 0));
+}
+
 /// The rule as docs/touch.md words it.
 std::set<Index3> flooded(const Map& map, const Contact& contact, const RegionSettings& settings) {
   const float band_m = float(settings.band_voxels * map.voxel_size_m), min_weight = float(settings.min_weight);
@@ -106,7 +117,7 @@ std::set<Index3> flooded(const Map& map, const Contact& contact, const RegionSet
   // What ends the region: candidates within two voxels on the plane of one that it grew through.
   for (const Index3& v : grown) {
     region.insert(v);
-    const SurfacePlane plane = surface_plane(map, v, min_weight);
+    const SurfacePlane plane = plane_at(map, v, min_weight);
     for (int dx = -2; dx <= 2; ++dx)
       for (int dy = -2; dy <= 2; ++dy)
         for (int dz = -2; dz <= 2; ++dz)

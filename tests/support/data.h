@@ -4,6 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "tests/support/skip.h"
+
 namespace felt::test {
 
 /// Folder of one recorded sequence below `FELTMAP_DATA` (environment, else the configured default), or nothing where it
@@ -30,10 +32,10 @@ private:
 }  // namespace felt::test
 
 /// Declares `variable` as the folder of a recorded sequence, or leaves the test as skipped.
-#define FELTMAP_REQUIRE_DATA(variable, name)                                                   \
-  const auto variable##_found = felt::test::recorded(name);                                    \
-  if (!variable##_found) {                                                                     \
-    WARN("FELTMAP_SKIP: no recorded data '" << (name) << "'; set FELTMAP_DATA to its folder"); \
-    return;                                                                                    \
-  }                                                                                            \
+#define FELTMAP_REQUIRE_DATA(variable, name)                                                            \
+  const auto variable##_found = felt::test::recorded(name);                                             \
+  if (!variable##_found) {                                                                              \
+    felt::test::skip(std::string("no recorded data '") + (name) + "'; set FELTMAP_DATA to its folder"); \
+    return;                                                                                             \
+  }                                                                                                     \
   const std::filesystem::path& variable = *variable##_found

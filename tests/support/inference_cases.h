@@ -1,5 +1,6 @@
 #pragma once
 
+#include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -12,11 +13,13 @@
 
 namespace felt::test {
 
-/// One JSON document a line.
-inline std::vector<nlohmann::json> read_json_lines(const std::filesystem::path& path) {
+/// One JSON document a line; the test fails where there are not `count` of them.
+inline std::vector<nlohmann::json> read_json_lines(const std::filesystem::path& path, size_t count) {
   std::vector<nlohmann::json> lines;
   std::ifstream file(path);
   for (std::string line; std::getline(file, line);) lines.push_back(nlohmann::json::parse(line));
+  INFO(path);
+  REQUIRE(lines.size() == count);
   return lines;
 }
 

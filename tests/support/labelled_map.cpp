@@ -21,6 +21,12 @@ void add_evidence(Map& map, const Index3& voxel, int slot, float count) {
   at->counts->value[offset_in_block(voxel)] += count;
 }
 
+double total_evidence(const Block& block, int offset) {
+  double total = block.even_evidence == nullptr ? 0 : double(block.even_evidence->value[offset]);
+  for (const EvidencePlane& plane : block.evidence) total += double(plane.counts->value[offset]);
+  return total;
+}
+
 Map labelled_map(double voxel_size_m, const Eigen::Vector3d& lo, const Eigen::Vector3d& hi, const SignedDistance& sdf,
                  const ClassTable& classes, const LabelAt& label_at, float counts) {
   Map map(voxel_size_m, 4 * voxel_size_m);

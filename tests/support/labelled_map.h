@@ -25,4 +25,7 @@ Map labelled_map(double voxel_size_m, const Eigen::Vector3d& lo, const Eigen::Ve
 /// Adds `count` observations of a class to one voxel; the block must exist.
 void add_evidence(Map& map, const Index3& voxel, int slot, float count);
 
+/// Observations of all classes in a voxel of a block, what they share evenly included.
+double total_evidence(const Block& block, int offset);
+
 }  // namespace felt::test

@@ -56,8 +56,7 @@ SequenceListing list_icl(const fs::path& path, const SequenceOptions& options) {
   if (const fs::path camera = first_existing(path, kOneCamera); !camera.empty()) {
     listing.intrinsics = read_camera_file(camera).intrinsics;
   } else {
-    listing.intrinsics = Intrinsics{481.2, 480, 319.5, 239.5};
-    listing.notes.push_back("no intrinsics.txt: the camera of ICL-NUIM (481.2, 480, 319.5, 239.5) is assumed");
+    assume_camera({481.2, 480, 319.5, 239.5}, "intrinsics.txt", "the camera of ICL-NUIM", listing);
   }
   return listing;
 }

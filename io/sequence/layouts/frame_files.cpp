@@ -48,4 +48,11 @@ void take_camera_file(const fs::path& file, const SequenceOptions& options, Sequ
   if (stated.depth_scale > 0) listing.depth_scale = stated.depth_scale;
 }
 
+void assume_camera(const Intrinsics& intrinsics, const std::string& file, const std::string& whose,
+                   SequenceListing& listing) {
+  listing.intrinsics = intrinsics;
+  listing.lacking_camera_file = file;
+  listing.notes.push_back("no " + file + ": " + whose + " (" + to_string(intrinsics) + ") is assumed");
+}
+
 }  // namespace felt

@@ -35,4 +35,8 @@ std::vector<FrameRecord> frame_records(const FrameFiles& files, const std::vecto
 /// as read_camera_file does.
 void take_camera_file(const std::filesystem::path& file, const SequenceOptions& options, SequenceListing& listing);
 
+/// Takes the camera of the layout's own recordings, for want of `file`, and says so in a note: "the camera of Replica".
+void assume_camera(const Intrinsics& intrinsics, const std::string& file, const std::string& whose,
+                   SequenceListing& listing);
+
 }  // namespace felt

@@ -138,7 +138,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   try {
     read_settings(file, listing, paths);
   } catch (const YAML::Exception& fault) {
-    throw ConfigError(file.string() + ":" + std::to_string(fault.mark.line + 1) + ": " + fault.msg);
+    throw ConfigError(yaml_fault(file.string(), fault));
   }
   const auto images = [&](const char* key) { return numbered_files(path / paths[key], "", {".png", ".jpg", ".jpeg"}); };
   const FrameFiles files{.depth = depth_files(path / paths["depth"]),

@@ -74,8 +74,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   if (const fs::path camera = first_existing(path, kCameras); !camera.empty()) {
     take_camera_file(camera, options, listing);
   } else if (!options.intrinsics) {
-    listing.intrinsics = Intrinsics{525, 525, 319.5, 239.5};
-    listing.notes.push_back("no intrinsic.json: Open3D's default camera (525, 525, 319.5, 239.5) is assumed");
+    assume_camera({525, 525, 319.5, 239.5}, "intrinsic.json", "Open3D's default camera", listing);
   }
   return listing;
 }

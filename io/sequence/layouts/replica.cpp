@@ -43,8 +43,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   if (!camera.empty()) {
     take_camera_file(camera, options, listing);
   } else if (!options.intrinsics) {
-    listing.intrinsics = Intrinsics{600, 600, 599.5, 339.5};
-    listing.notes.push_back("no cam_params.json: the camera of Replica (600, 600, 599.5, 339.5) is assumed");
+    assume_camera({600, 600, 599.5, 339.5}, "cam_params.json", "the camera of Replica", listing);
   }
   if (const fs::path table = first_existing(path, {"classes.yaml", "classes_semantic.csv"}); !table.empty())
     listing.classes = read_class_table(table);

@@ -48,8 +48,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
     if (!camera.empty()) {
       listing.intrinsics = read_camera_file(camera).intrinsics;
     } else {
-      listing.intrinsics = Intrinsics{585, 585, 320, 240};
-      listing.notes.push_back("no camera-intrinsics.txt: the depth camera of 7-Scenes (585, 585, 320, 240) is assumed");
+      assume_camera({585, 585, 320, 240}, "camera-intrinsics.txt", "the depth camera of 7-Scenes", listing);
     }
   }
   // Microsoft's recordings: depth is not registered to colour, whose camera has another focal length. How the cameras

@@ -158,9 +158,8 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   if (!camera.empty() && (!options.intrinsics || camera.extension() == ".yaml")) {
     take_camera_file(camera, options, listing);
   } else if (!options.intrinsics) {
-    listing.intrinsics = Intrinsics{525, 525, 319.5, 239.5};
-    listing.notes.push_back(
-        "no camera file: the TUM benchmark's default for registered images (525, 525, 319.5, 239.5) is assumed");
+    assume_camera({525, 525, 319.5, 239.5}, "camera-intrinsics.txt",
+                  "the TUM benchmark's default for registered images", listing);
   }
   return listing;
 }

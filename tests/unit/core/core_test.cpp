@@ -15,6 +15,10 @@ TEST_CASE("block arithmetic floors for negative voxels") {
   for (int i = 0; i < kBlockVoxels; ++i) {
     const Index3 v = voxel_of_offset(i);
     REQUIRE(voxel_offset(v.x, v.y, v.z) == i);
+    const Index3 far = voxel_at({-1, 0, 2}, i);
+    REQUIRE(far == Index3{v.x - 8, v.y, v.z + 16});
+    REQUIRE(block_of_voxel(far) == BlockCoord{-1, 0, 2});
+    REQUIRE(offset_in_block(far) == i);
   }
 }
 

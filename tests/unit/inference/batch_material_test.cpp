@@ -87,7 +87,7 @@ double worst_over_bound(unsigned seed, size_t k, double location, double scale, 
   }
   const MaterialBatch batch{n,        count.data(),         mean.data(), m2.data(),
                             location, concentration.data(), classes,     surprise.data()};
-  CHECK(material_view(batch, rho) == MaterialCounts{n, 0, n});
+  CHECK(material_view(batch, rho) == BatchCounts{n, 0, n});
   double worst = 0;
   for (size_t v = 0; v < n; ++v) {
     const ReadingStatistics readings{double(count[v]), double(mean[v]) + location, double(m2[v])};
@@ -156,7 +156,7 @@ TEST_CASE("priors and beliefs beyond what f32 vectors hold are computed in f64")
 
 TEST_CASE("the material view of a batch is the f64 posterior of each voxel, each distinct state computed once") {
   Region region(100);
-  CHECK(material_view(region.batch(), 0.5) == MaterialCounts{66, 0, 2});
+  CHECK(material_view(region.batch(), 0.5) == BatchCounts{66, 0, 2});
   for (size_t v = 0; v < region.n; ++v) {
     if (v % 3 == 0) {
       REQUIRE(region.classes[0].a[v] == -7.0f);
@@ -190,7 +190,7 @@ TEST_CASE("covered voxels whose statistics or belief are no numbers are left alo
   region.belief[0][5] = -0.1f;
   region.belief[0][7] = region.belief[1][7] = 0;  // what is left has no prior
   region.concentration[8] = std::numeric_limits<float>::quiet_NaN();
-  const MaterialCounts counts = material_view(region.batch(), 0.5);
+  const BatchCounts counts = material_view(region.batch(), 0.5);
   CHECK(counts.refused == 6);
   CHECK(counts.updated == 60);
   for (size_t v : {1u, 2u, 4u, 5u, 7u, 8u}) CHECK(region.classes[1].tau[v] == -7.0f);

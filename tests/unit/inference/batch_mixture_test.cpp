@@ -48,7 +48,7 @@ void compare(Errors& e, const MixtureStates& found, size_t v, const MixtureUpdat
 /// Against f64 on the same f32 state.
 Errors errors_of_update(MixtureStates states, double psi, double noise_sd = 0) {
   const MixtureStates before = states;
-  const MixtureCounts counts = update_mixture(states.batch(), psi, noise_sd);
+  const BatchCounts counts = update_mixture(states.batch(), psi, noise_sd);
   CHECK(counts.updated == states.n());
   CHECK(counts.refused == 0);
   Errors e;
@@ -180,7 +180,7 @@ TEST_CASE("a class without a prior has responsibility zero and shares the Dirich
     no_class.forget_prior(0);
     no_class.forget_prior(1);
     const std::vector<float> before = no_class.values();
-    CHECK(update_mixture(no_class.batch(), 0.5) == MixtureCounts{0, 33, 0});
+    CHECK(update_mixture(no_class.batch(), 0.5) == BatchCounts{0, 33, 0});
     CHECK(same_bits(before, no_class.values()));
   });
 }
@@ -222,7 +222,7 @@ TEST_CASE("published refuses the same voxels as f64, which keep their state, and
     const double psi = 1.5;
     MixtureStates states = ordinary_states(4, 500, 9, 0.4, 0.3);
     const MixtureStates before = states;
-    const MixtureCounts counts = update_mixture(states.batch(), psi, 0, Projection::published);
+    const BatchCounts counts = update_mixture(states.batch(), psi, 0, Projection::published);
     size_t refused = 0, close_calls = 0;
     Errors e;
     for (size_t v = 0; v < states.n(); ++v) {
@@ -263,7 +263,7 @@ TEST_CASE("equal voxels are computed once and a voxel's result does not depend o
       many.selected()[v] = v % 26 != 7;
     }
     const MixtureStates before = many;
-    const MixtureCounts counts = update_mixture(many.batch(), 0.5);
+    const BatchCounts counts = update_mixture(many.batch(), 0.5);
     CHECK(counts.computed == 5);
     CHECK(counts.updated == 1037 - 40);
     MixtureStates alone = five;

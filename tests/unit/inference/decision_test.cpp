@@ -1,5 +1,7 @@
 #include "inference/decision.h"
 
+#include <algorithm>
+#include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <boost/math/quadrature/sinh_sinh.hpp>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -25,6 +27,31 @@ double mutual_information(const StudentTMixture& m) {
   });
   for (size_t c = 0; c < m.weight.size(); ++c) information -= m.weight[c] * entropy(m.component[c]);
   return information;
+}
+
+// P(|T - location + N(0, noise_sd^2)| >= distance): the mean of the distribution function over the noise, by panels
+// that are narrow where it turns.
+double convolved_tail(const StudentT& t, double distance, double noise_sd) {
+  const StudentT centred{0, t.scale2, t.dof};
+  const double farthest = 40, turn = distance / noise_sd, width = std::sqrt(t.scale2) / noise_sd;
+  std::vector<double> edge{-farthest, farthest};
+  for (int i = -10; i <= 10; ++i) edge.push_back(1.5 * i);
+  for (const double centre : {-turn, turn})
+    for (const double scales : {0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4})
+      for (const double side : {-1.0, 1.0}) edge.push_back(centre + side * scales * width);
+  std::erase_if(edge, [&](double at) { return std::abs(at) > farthest; });
+  std::sort(edge.begin(), edge.end());
+  double sum = 0;
+  for (size_t i = 0; i + 1 < edge.size(); ++i) {
+    if (edge[i] == edge[i + 1]) continue;
+    sum += boost::math::quadrature::gauss_kronrod<double, 31>::integrate(
+        [&](double z) {
+          const double density = std::exp(-z * z / 2) / std::sqrt(2 * M_PI);
+          return density * (cdf(centred, noise_sd * z - distance) + cdf(centred, -noise_sd * z - distance));
+        },
+        edge[i], edge[i + 1], 6, 1e-11);
+  }
+  return sum;
 }
 
 }  // namespace
@@ -95,12 +122,48 @@ TEST_CASE("two humps count as two modes only when a dip parts them") {
 
 TEST_CASE("a reading that no class explains is surprising; in a mixed region it warns of several materials") {
   const StudentTMixture mixed = pair_at_distance(6), sure{{1.0}, {{3, 1, 50}}};
-  CHECK(tail_probability(sure, 3) == Approx(1));
-  CHECK_FALSE(region_flags(mixed, 2.5).surprising);
-  CHECK(region_flags(mixed, 2.5).multi_modal);
-  CHECK(region_flags(mixed, 12).not_one_material);
-  CHECK(region_flags(sure, 12).surprising);
-  CHECK_FALSE(region_flags(sure, 12).not_one_material);
+  CHECK(tail_probability(sure, 3, 0) == Approx(1));
+  CHECK_FALSE(region_flags(mixed, 2.5, 0).surprising);
+  CHECK(region_flags(mixed, 2.5, 0).multi_modal);
+  CHECK(region_flags(mixed, 12, 0).not_one_material);
+  CHECK(region_flags(sure, 12, 0).surprising);
+  CHECK_FALSE(region_flags(sure, 12, 0).not_one_material);
+  const RegionFlags noisy = region_flags(mixed, 12, 8);
+  CHECK_FALSE(noisy.surprising);
+  CHECK_FALSE(noisy.not_one_material);
+  CHECK(noisy.multi_modal);  // of what is there, not of how well it is measured
+}
+
+TEST_CASE("the tail of a noisy reading is that of the Student-t convolved with the noise") {
+  double worst = 0;
+  for (const double dof : {0.07, 1.0, 3.0, 50.0, 1e6})
+    for (const double noise_sd : {1e-3, 0.1, 0.5, 1.0, 3.0, 100.0})
+      for (const double z : {0.0, 0.3, 1.0, 3.0, 6.0}) {
+        const StudentT t{-2, 4, dof};
+        const double sd = 2 * noise_sd, distance = z * std::hypot(2, sd);
+        const double found = tail_probability({{1}, {t}}, t.location + distance, sd);
+        const double expected = convolved_tail(t, distance, sd);
+        INFO("dof " << dof << ", noise " << noise_sd << " scales, z " << z << ": " << found << ", " << expected);
+        CHECK(found == Approx(expected).epsilon(1e-8).margin(0));
+        worst = std::max(worst, std::abs(found / expected - 1));
+      }
+  INFO("largest relative error " << worst);
+  CHECK(worst < 1e-8);
+}
+
+TEST_CASE("the more noise a reading has the less it surprises, and without noise the tail is the distribution's") {
+  const StudentTMixture mixed{{0.2, 0.5, 0.3}, {{0.19, 0.0021, 50}, {0.54, 0.0042, 7}, {0.39, 0.005, 2.5}}};
+  double last = 0;
+  for (size_t c = 0; c < 3; ++c)
+    last += mixed.weight[c] * 2 * cdf(mixed.component[c], 2 * mixed.component[c].location - 1.2);
+  CHECK(tail_probability(mixed, 1.2, 0) == Approx(last).epsilon(1e-12));
+  CHECK(tail_probability(mixed, 1.2, 1e-9) == Approx(last).epsilon(1e-7));
+  for (const double noise_sd : {0.03, 0.1, 0.3, 1.0, 3.0, 1000.0}) {
+    const double tail = tail_probability(mixed, 1.2, noise_sd);
+    CHECK(tail > last);
+    last = tail;
+  }
+  CHECK(last == Approx(1).epsilon(1e-3));
 }
 
 TEST_CASE("the published initialisation is refused where the mean is not positive") {

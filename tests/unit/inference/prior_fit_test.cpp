@@ -45,6 +45,28 @@ TEST_CASE("analysis of variance by hand") {
   CHECK(fit->effective_readings == Approx(4 / (1 + *fit->rho)));
 }
 
+TEST_CASE("analysis of variance of groups of unequal sizes by hand") {
+  // Means 2 and 10 of 3 and 1 readings, 4 of all: within squares 8, between squares 3 * 2^2 + 6^2 = 48, size
+  // (4 - 10 / 4) / 1 = 1.5.
+  const auto fit = fit_prior({{0, 2, 4}, {10}});
+  REQUIRE(fit);
+  const double within = 8.0 / 2, between = (48 - within) / 1.5;
+  CHECK(fit->mean == 4);
+  CHECK(*fit->rho == Approx(between / (between + within)).epsilon(1e-12));
+  CHECK(fit->sd == Approx(std::sqrt(between + within)).epsilon(1e-12));
+  CHECK(fit->effective_readings == Approx(4 / (1 + 1.5 * *fit->rho)).epsilon(1e-12));
+}
+
+TEST_CASE("a property's correlation counts a class by its groups less one, and not where it has none") {
+  PriorFit few, many, none;
+  few.groups = 3, few.rho = 0.2;
+  many.groups = 11, many.rho = 0.8;
+  none.groups = 40;
+  const PriorFit all[] = {few, none, many};
+  CHECK(*pooled_rho(all) == Approx((2 * 0.2 + 10 * 0.8) / 12).epsilon(1e-12));
+  CHECK_FALSE(pooled_rho({&none, 1}));
+}
+
 TEST_CASE("without groups there is no correlation to find, and one reading is no fit") {
   const auto fit = fit_prior({{0.1, 0.2, 0.4}});
   REQUIRE(fit);

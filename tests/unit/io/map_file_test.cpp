@@ -4,10 +4,11 @@
 
 #include <catch2/catch.hpp>
 #include <fstream>
-#include <iterator>
 #include <random>
 
 #include "core/error.h"
+#include "io/files/text_input.h"
+#include "mapping/maps/map_diff.h"
 #include "tests/support/data.h"
 #include "tests/support/random_map.h"
 
@@ -16,11 +17,6 @@ using Catch::Matchers::Contains;
 namespace fs = std::filesystem;
 
 namespace {
-
-std::string bytes_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 void write_bytes(const fs::path& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
 
@@ -34,6 +30,7 @@ TEST_CASE("a loaded map has the hash, the tables and the journals of the saved o
     save_map(map, directory.path() / "map.vdb", {.compression = compression});
     const Map loaded = load_map(directory.path() / "map.vdb");
     CHECK(map_hash(loaded) == map_hash(map));
+    CHECK_FALSE(beyond(difference(map, loaded), 0));
     CHECK(loaded.voxel_size_m == map.voxel_size_m);
     CHECK(loaded.truncation_m == map.truncation_m);
     CHECK(loaded.classes == map.classes);
@@ -96,7 +93,7 @@ TEST_CASE("equal maps give equal files, whatever the order in which their blocks
   const Map map = test::random_map({.seed = 9, .blocks = 30, .classes = 3});
   save_map(map, directory.path() / "a.vdb");
   save_map(load_map(directory.path() / "a.vdb"), directory.path() / "b.vdb");
-  CHECK(bytes_of(directory.path() / "a.vdb") == bytes_of(directory.path() / "b.vdb"));
+  CHECK(read_whole_file(directory.path() / "a.vdb") == read_whole_file(directory.path() / "b.vdb"));
 }
 
 TEST_CASE("a stock reader sees the grids of a map file, with their metadata and grid offsets") {
@@ -124,7 +121,7 @@ TEST_CASE("a map file that lacks its trailer, has another version or was changed
   const test::TemporaryDirectory directory;
   const fs::path path = directory.path() / "map.vdb";
   save_map(test::random_map({.seed = 5, .blocks = 3, .classes = 1}), path);
-  const std::string whole = bytes_of(path);
+  const std::string whole = read_whole_file(path);
   const auto refused = [&](std::string bytes) -> std::string {
     write_bytes(path, bytes);
     try {
@@ -155,10 +152,10 @@ TEST_CASE("a failed save leaves the map that was there") {
   const fs::path path = directory.path() / "map.vdb";
   Map map = test::random_map({.seed = 6, .blocks = 3, .classes = 1});
   save_map(map, path);
-  const std::string before = bytes_of(path);
+  const std::string before = read_whole_file(path);
   map.frames.runs.push_back({"not \xff UTF-8", "", {0}});
   CHECK_THROWS_AS(save_map(map, path), Error);
-  CHECK(bytes_of(path) == before);
+  CHECK(read_whole_file(path) == before);
   CHECK(std::distance(fs::directory_iterator(directory.path()), {}) == 1);
   CHECK_THROWS_AS(save_map(map, directory.path() / "no such folder" / "map.vdb"), IoError);
 }

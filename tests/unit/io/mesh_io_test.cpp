@@ -1,13 +1,15 @@
 #include "io/meshes/mesh_io.h"
 
+#include <sys/stat.h>
+
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <random>
 
 #include "core/error.h"
+#include "io/files/text_input.h"
 #include "tests/support/data.h"
 
 using namespace felt;
@@ -25,11 +27,6 @@ TriangleMesh example() {
   mesh.triangles = {{0, 1, 2}, {2, 1, 3}};
   mesh.triangle_scalars = {{"segment", {7, 8}}};
   return mesh;
-}
-
-std::string content(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 bool same_scalars(const std::vector<MeshScalars>& a, const std::vector<MeshScalars>& b) {
@@ -58,7 +55,7 @@ TEST_CASE("a mesh written as PLY is read back with every array as it was") {
   CHECK(again.triangles == mesh.triangles);
   CHECK(same_scalars(again.scalars, mesh.scalars));
   CHECK(same_scalars(again.triangle_scalars, mesh.triangle_scalars));
-  CHECK_THAT(content(folder.path() / "m.ply"), Contains("comment voxel_size_m 0.02\n"));
+  CHECK_THAT(read_whole_file(folder.path() / "m.ply"), Contains("comment voxel_size_m 0.02\n"));
 }
 
 TEST_CASE("a point cloud is a PLY file without faces") {
@@ -66,7 +63,7 @@ TEST_CASE("a point cloud is a PLY file without faces") {
   TriangleMesh cloud;
   cloud.positions = {{1, 2, 3}, {4, 5, 6}};
   write_mesh(folder.path() / "c.PLY", cloud);
-  CHECK_THAT(content(folder.path() / "c.PLY"), !Contains("element face"));
+  CHECK_THAT(read_whole_file(folder.path() / "c.PLY"), !Contains("element face"));
   const TriangleMesh again = read_mesh(folder.path() / "c.PLY");
   CHECK(again.positions == cloud.positions);
   CHECK(again.normals.empty());
@@ -96,7 +93,7 @@ TEST_CASE("big-endian PLY is read") {
 TEST_CASE("a PLY file cut anywhere is refused, and never crashes") {
   const test::TemporaryDirectory folder;
   write_ply(folder.path() / "m.ply", example());
-  const std::string whole = content(folder.path() / "m.ply");
+  const std::string whole = read_whole_file(folder.path() / "m.ply");
   for (size_t size = 0; size < whole.size(); ++size)
     REQUIRE_THROWS_AS(parse_ply(std::string_view(whole).substr(0, size), "cut.ply"), FormatError);
   const std::string ascii = std::string(kAsciiHead) + "0 0 0 1 2 3 1 0 0 1 2 3 1 1 0 2 2 2 0 1 0 0 0 0 4 0 1 2 3 17 5";
@@ -108,7 +105,7 @@ TEST_CASE("a PLY file cut anywhere is refused, and never crashes") {
 TEST_CASE("PLY files with flipped bytes are read or refused, and never crash") {
   const test::TemporaryDirectory folder;
   write_ply(folder.path() / "m.ply", example());
-  const std::string whole = content(folder.path() / "m.ply");
+  const std::string whole = read_whole_file(folder.path() / "m.ply");
   std::mt19937 random(1);
   int refused = 0;
   for (int trial = 0; trial < 3000; ++trial) {
@@ -184,7 +181,7 @@ TEST_CASE("a GLB file holds the chunks and accessors that its header announces")
   const test::TemporaryDirectory folder;
   TriangleMesh mesh = example();
   write_mesh(folder.path() / "m.glb", mesh);
-  const std::string bytes = content(folder.path() / "m.glb");
+  const std::string bytes = read_whole_file(folder.path() / "m.glb");
   const auto u32 = [&](size_t at) {
     uint32_t v;
     std::memcpy(&v, bytes.data() + at, 4);
@@ -223,7 +220,7 @@ TEST_CASE("a GLB file holds the chunks and accessors that its header announces")
   CHECK(color[2] / 65535.0 == Approx(0.2158605).epsilon(1e-4));
 
   write_glb(folder.path() / "empty.glb", {});
-  const std::string empty = content(folder.path() / "empty.glb");
+  const std::string empty = read_whole_file(folder.path() / "empty.glb");
   CHECK_FALSE(nlohmann::json::parse(empty.substr(20)).contains("meshes"));
 }
 
@@ -234,16 +231,19 @@ TEST_CASE("unknown extensions and unreadable files are refused by name") {
   CHECK_THROWS_AS(read_mesh(folder.path() / "absent.ply"), IoError);
   std::filesystem::create_directory(folder.path() / "d.ply");
   CHECK_THROWS_AS(read_mesh(folder.path() / "d.ply"), IoError);
+  const std::filesystem::path pipe = folder.path() / "p.ply";
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  CHECK_THROWS_WITH(read_mesh(pipe), Contains("p.ply") && Contains("found a device or pipe"));
 }
 
 TEST_CASE("meshes made elsewhere are read") {
   FELTMAP_REQUIRE_DATA(house, "house_living_rendered");
+  FELTMAP_REQUIRE_DATA(meshes, "meshes");
   const TriangleMesh room = read_mesh(house / "gt_mesh.ply");
   CHECK(room.positions.size() == 21229);
   CHECK(room.triangles.size() == 25798);
   REQUIRE(TriangleMesh::find(room.triangle_scalars, "semantic") != nullptr);
   CHECK(TriangleMesh::find(room.triangle_scalars, "instance")->size() == 25798);
-  FELTMAP_REQUIRE_DATA(meshes, "meshes");
   CHECK(read_mesh(meshes / "stanford-bunny.obj").triangles.size() > 60000);
   CHECK(read_mesh(meshes / "spot.obj").triangles.size() > 5000);
 }

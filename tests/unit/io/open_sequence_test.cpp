@@ -425,6 +425,12 @@ TEST_CASE("sizes and numbers beyond all measure are refused, not cut") {
   CHECK_THROWS_WITH(open_sequence(folder.path()), Catch::Contains("trajectory.log:1"));
 }
 
+TEST_CASE("Open3D's name stands for the layout that it shares with redwood") {
+  TemporaryDirectory folder;
+  write_redwood(folder.path(), 2);
+  CHECK(open_sequence(folder.path(), {.format = "open3d"})->info().layout == "redwood");
+}
+
 TEST_CASE("what cannot be opened says what was looked for") {
   TemporaryDirectory folder;
   CHECK_THROWS_WITH(open_sequence(folder.path() / "absent"), Catch::Contains("absent"));
@@ -449,6 +455,21 @@ TEST_CASE("intrinsics that cannot belong to the images are refused with the file
   }
   for (const char* text : {"", "1,2,3", "1,2,3,4,5", "0,20,1,1", "a,b,c,d", "1,2,3,inf"})
     CHECK_THROWS_AS(parse_intrinsics(text, "--intrinsics"), ConfigError);
+}
+
+TEST_CASE("a camera that does not fit is called the layout's default only where it is, with what to give instead") {
+  TemporaryDirectory folder;
+  write_tum(folder.path(), 1);
+  const fs::path camera = folder.path() / "camera-intrinsics.txt";
+  write_text(camera, "525 525 319.5 239.5\n");
+  CHECK_THROWS_WITH(open_sequence(folder.path()), Catch::Contains("found fx 525") && !Catch::Contains("default"));
+  fs::remove(camera);
+  CHECK_THROWS_WITH(open_sequence(folder.path()),
+                    Catch::EndsWith("found the layout's default 525, 525, 319.5, 239.5; give --intrinsics fx,fy,cx,cy "
+                                    "or a camera-intrinsics.txt"));
+  CHECK_THROWS_WITH(open_sequence(folder.path(), {.intrinsics = Intrinsics{525, 525, 319.5, 239.5}}),
+                    Catch::Contains("found fx 525") && !Catch::Contains("default"));
+  CHECK(open_sequence(folder.path(), {.intrinsics = Intrinsics{20, 20, 11.5, 7.5}})->info().camera.fx == 20);
 }
 
 TEST_CASE("a generic sequence reports every problem of its description at once") {

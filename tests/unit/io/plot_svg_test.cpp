@@ -74,6 +74,22 @@ TEST_CASE("a logarithmic axis places decades evenly and leaves out what is not p
   CHECK(count_of(svg, "M62.0,143.0L225.0,143.0L388.0,30.0\"") == 1);
 }
 
+TEST_CASE("a logarithmic axis says so, and short ones are marked between decades too") {
+  const auto drawn = [](double from, double to) {
+    return plot_svg({{"", "pixels", "ms", {{"", {from, to}, {1.2, 1.9}}}, {}, true, true}}, 1, 400, 300);
+  };
+  const std::string svg = drawn(3, 40);
+  for (const char* tick : {"5", "10", "20", "1.2", "1.4", "1.6", "1.8"}) {
+    INFO(tick);
+    CHECK(count_of(svg, '>' + std::string(tick) + "</text>") == 1);
+  }
+  CHECK(count_of(svg, ">pixels (log)<") == 1);
+  CHECK(count_of(svg, ">ms (log)<") == 1);
+  const std::string long_one = drawn(1, 10000);
+  CHECK(count_of(long_one, ">1000</text>") == 1);
+  CHECK(count_of(long_one, ">2000</text>") == 0);
+}
+
 TEST_CASE("panels fill rows, and an empty or constant plot is still a picture") {
   const Plot empty{"empty", "", "", {}, {}};
   const Plot constant{"constant", "", "", {{"", {3, 3}, {0, 0}}}, {}};

@@ -119,6 +119,7 @@ TEST_CASE("a .sens container gives the frames it was made of, and its lost frame
   FELTMAP_REQUIRE_DATA(house, "house_living_rendered");
   const auto reader = open_sequence(folder / "house_living.sens");
   CHECK(reader->info().layout == "sens");
+  CHECK(open_sequence(folder / "house_living.sens", {.format = "scannet"})->info().layout == "sens");
   REQUIRE(reader->size() == 16);
   int skipped = 0;
   for (int64_t i = 0; i < reader->size(); ++i) {
@@ -137,8 +138,8 @@ TEST_CASE("a .sens container gives the frames it was made of, and its lost frame
 
 TEST_CASE("a folder with one container is that container, and recordings of ROS are told as what they are") {
   FELTMAP_REQUIRE_DATA(folder, "scannet_sens_small");
-  CHECK(open_sequence(folder)->size() == open_sequence(folder / "house_living.sens")->size());
   FELTMAP_REQUIRE_DATA(logs, "small_logs");
+  CHECK(open_sequence(folder)->size() == open_sequence(folder / "house_living.sens")->size());
   CHECK_THROWS_WITH(open_sequence(logs), Catch::Contains("*.bag") && Catch::Contains("ROS"));
 }
 

@@ -39,6 +39,18 @@ TEST_CASE("recorded touches are read by column name") {
   CHECK(touches[1].sigma == 0.05);
 }
 
+TEST_CASE("rows of one touch file may give a point or a pixel each") {
+  const auto touches =
+      parse_touches("frame,x,y,z,u,v,property,value\n7,1,2,3,,,friction,0.3\n8,,,,12,13,friction,0.4\n", "t.csv");
+  REQUIRE(touches.size() == 2);
+  CHECK(*touches[0].point_m == Eigen::Vector3d(1, 2, 3));
+  CHECK_FALSE(touches[0].pixel);
+  CHECK_FALSE(touches[1].point_m);
+  CHECK(*touches[1].pixel == Eigen::Vector2d(12, 13));
+  CHECK_THROWS_WITH(parse_touches("frame,x,y,z,u,v,property,value\n7,1,,3,,,friction,0.3\n", "t.csv"),
+                    "t.csv:2: y: expected a number, found ''");
+}
+
 TEST_CASE("touch files of spreadsheets are read: a byte order mark, semicolons, Windows line ends") {
   const auto touches = parse_touches("\xef\xbb\xbfstamp;x;y;z;property;value\r\n1;2;3;4;\"friction\";0.3\r\n", "t.csv");
   REQUIRE(touches.size() == 1);
@@ -65,6 +77,16 @@ TEST_CASE("points are read with or without a header, by commas or semicolons, af
   CHECK_THROWS_WITH(read("1,2\n1,2,3,4\nx,y,z\n"),
                     file.string() + ":1: point: expected x,y,z, found '1,2' (and 2 more faults)");
   CHECK_THROWS_WITH(read_points(folder.path()), Catch::Contains("found a folder"));
+}
+
+TEST_CASE("a mask that cannot be read is told from one that is no image") {
+  const TemporaryDirectory folder;
+  const auto file = folder.path() / "mask.png";
+  const std::vector<double> camera = {20, 20, 11.5, 7.5}, pose = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  CHECK_THROWS_WITH(read_view_mask(file, camera, pose), Catch::Contains("found nothing"));
+  CHECK_THROWS_WITH(read_view_mask(folder.path(), camera, pose), Catch::Contains("found a folder"));
+  std::ofstream(file) << "no image";
+  CHECK_THROWS_AS(read_view_mask(file, camera, pose), FormatError);
 }
 
 TEST_CASE("the first fault of a touch file is named with its line, and how many more there are") {
@@ -98,6 +120,37 @@ TEST_CASE("a pixel touch lands where its frame saw the surface, one outside the 
   CHECK_THAT(outcomes[1].refused, Catch::Contains("stamp"));
   CHECK_THAT(outcomes[2].refused, Catch::Contains("pixel"));
   CHECK(map.touches.touches.size() == 1);
+}
+
+TEST_CASE("readings that count already are left out if told so, one row for each") {
+  Map map = floor_map();
+  const auto touches = parse_touches(
+      "stamp,x,y,z,property,value\n1,-0.2,0,0,friction,0.2\n1,-0.2,0,0,friction,0.2\n2,-0.2,0,0,friction,0.2\n", "t");
+  TouchRequest request;
+  request.stamp_s = 1;
+  request.point_m = {-0.2, 0, 0};
+  request.property = "friction";
+  request.value = 0.2;
+  request.model = TouchModel::mixture;  // the same reading, understood in another way
+  const uint64_t id = apply_touch(map, resolve_touch(map, request)).id;
+  const auto left_out = [&] {
+    std::vector<bool> known;
+    for (const TouchOutcome& outcome : apply_recorded_touches(map, touches, {}, nullptr, KnownReadings::leave_out)) {
+      CHECK(outcome.refused.empty());
+      CHECK(outcome.already_counted != outcome.effect.has_value());
+      known.push_back(outcome.already_counted);
+    }
+    return known;
+  };
+  undo_touch(map, id);
+  CHECK(left_out() == std::vector<bool>{false, false, false});
+  CHECK(left_out() == std::vector<bool>{true, true, true});
+  CHECK(map.touches.touches.size() == 4);
+  Map once = floor_map();
+  std::swap(map, once);
+  apply_touch(map, resolve_touch(map, request));
+  CHECK(left_out() == std::vector<bool>{true, false, false});
+  CHECK(apply_recorded_touches(map, touches, {}, nullptr).front().effect.has_value());
 }
 
 TEST_CASE("a touched map goes through its file unchanged, touches, regions and undone ones included") {

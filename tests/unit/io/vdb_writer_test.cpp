@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <fstream>
-#include <iterator>
 #include <random>
 
+#include "io/files/text_input.h"
 #include "io/map_file/map_grids.h"
 #include "tests/support/data.h"
 #include "tests/support/random_map.h"
@@ -94,11 +94,6 @@ void write(const fs::path& path, const std::vector<LeafGrid>& grids, VdbCodec co
   writer.begin(metadata, grids.size(), "seed");
   for (const LeafGrid& grid : grids) writer.write(grid, codec, in_16_bits);
   writer.commit();
-}
-
-std::string bytes_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 template <typename Grid>
@@ -197,7 +192,7 @@ TEST_CASE("the bytes of a file do not depend on the number of threads") {
       const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
       write(directory.path() / "one.vdb", map_grids(map), codec);
     }
-    CHECK(bytes_of(directory.path() / "one.vdb") == bytes_of(directory.path() / "many.vdb"));
+    CHECK(read_whole_file(directory.path() / "one.vdb") == read_whole_file(directory.path() / "many.vdb"));
   }
 }
 

@@ -2,26 +2,25 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
+#include "tests/support/squares.h"
 
 using namespace felt;
+using namespace felt::test;
 
 namespace {
 
-/// A square of a side in the plane z, from (x, 0).
-TriangleMesh square(float x, float side, float z) {
-  TriangleMesh mesh;
-  mesh.positions = {{x, 0, z}, {x + side, 0, z}, {x + side, side, z}, {x, side, z}};
-  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
-  return mesh;
-}
-
-TriangleMesh both(TriangleMesh a, const TriangleMesh& b) {
-  const auto n = uint32_t(a.positions.size());
-  a.positions.insert(a.positions.end(), b.positions.begin(), b.positions.end());
-  for (const Triangle& t : b.triangles) a.triangles.push_back(t + Triangle::Constant(n));
-  return a;
+/// Two metres above (0.5, 0.5, 0), looking down: its image ends a little over two metres from there.
+ObservingCameras looking_down() {
+  ObservingCameras cameras;
+  cameras.camera = {300, 300, 319.5, 239.5, 640, 480};
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  T.translation() = Eigen::Vector3d(0.5, 0.5, 2);
+  cameras.T_world_camera = {T};
+  return cameras;
 }
 
 }  // namespace
@@ -66,12 +65,7 @@ TEST_CASE("normals at a right angle are inconsistent") {
 TEST_CASE("only what a camera saw of the reference counts") {
   // Looking down from 2 m onto a square that hides another one below it; a third one lies outside the image.
   const TriangleMesh reference = both(both(square(0, 1, 0), square(0, 1, -1)), square(20, 1, 0));
-  ObservingCameras cameras;
-  cameras.camera = {300, 300, 319.5, 239.5, 640, 480};
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()).toRotationMatrix();
-  T.translation() = Eigen::Vector3d(0.5, 0.5, 2);
-  cameras.T_world_camera = {T};
+  ObservingCameras cameras = looking_down();
   const TriangleMesh reconstruction = square(0, 1, 0);
   const GeometryScores all = evaluate_geometry(reconstruction, reference, {.samples = 3000});
   const GeometryScores seen = evaluate_geometry(reconstruction, reference, {.samples = 3000}, &cameras);
@@ -80,6 +74,34 @@ TEST_CASE("only what a camera saw of the reference counts") {
   CHECK(seen.recall == 1);
   cameras.max_depth_m = 1.9;
   CHECK_THROWS_AS(evaluate_geometry(reconstruction, reference, {.samples = 3000}, &cameras), Error);
+}
+
+TEST_CASE("the root mean square weighs far parts more than the mean does") {
+  const TriangleMesh reference = both(square(0, 1, 0), square(5, 1, 0)),
+                     shifted = both(square(0, 1, 0.01f), square(5, 1, 0.03f));
+  const GeometryScores s = evaluate_geometry(shifted, reference, {.samples = 4000, .threshold_m = 0.02});
+  CHECK(s.accuracy_mean_m == Approx(0.02).epsilon(0.01));
+  CHECK(s.accuracy_rms_m == Approx(std::sqrt((0.01 * 0.01 + 0.03 * 0.03) / 2)).epsilon(0.01));
+  CHECK(s.precision == Approx(0.5).epsilon(0.01));
+}
+
+TEST_CASE("which side of a triangle its corners run round makes no normal inconsistent") {
+  TriangleMesh flipped = square(0, 1, 0);
+  for (Triangle& t : flipped.triangles) std::swap(t[0], t[1]);
+  CHECK(evaluate_geometry(flipped, square(0, 1, 0), {.samples = 500}).normal_consistency == Approx(1));
+}
+
+TEST_CASE("what no camera saw of a reconstruction counts, unless it is culled") {
+  const TriangleMesh reference = square(0, 1, 0), reconstruction = both(square(0, 1, 0), square(20, 1, 0));
+  const ObservingCameras cameras = looking_down();
+  GeometryOptions options{.samples = 3000};
+  const GeometryScores all = evaluate_geometry(reconstruction, reference, options, &cameras);
+  CHECK(all.reconstruction_seen == 1);
+  CHECK(all.precision == Approx(0.5).epsilon(0.01));
+  options.cull_reconstruction = true;
+  const GeometryScores culled = evaluate_geometry(reconstruction, reference, options, &cameras);
+  CHECK(culled.reconstruction_seen == Approx(0.5).epsilon(0.01));
+  CHECK(culled.precision == 1);
 }
 
 TEST_CASE("meshes without area cannot be compared") {

@@ -2,11 +2,14 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "mapping/touch/touch_update.h"
+#include "mapping/touch/touch_view.h"
 #include "tests/support/labelled_map.h"
 #include "tests/support/random_map.h"
+#include "tests/support/voxel_where.h"
 
 using namespace felt;
 using test::random_map;
@@ -55,6 +58,46 @@ TEST_CASE("a difference is found in the channel and by the amount that was chang
   CHECK_FALSE(beyond(d, 0.3));
 }
 
+TEST_CASE("one changed value of each kind of plane is found, in its channel and unit, and in no other") {
+  const auto make = [] {
+    return random_map({.seed = 2, .blocks = 12, .classes = 3, .shared_evidence = true, .instances = true});
+  };
+  struct Case {
+    const char* channel;
+    double difference;
+    std::function<void(Block&, int)> change;
+  };
+  // A colour is stored in 1/256 grey levels. By one bit or downwards, so that no number wraps around.
+  const Case cases[] = {
+      {"color", 2, [](Block& b, int i) { b.color->r[i] ^= 512; }},
+      {"color", 2, [](Block& b, int i) { b.color->g[i] ^= 512; }},
+      {"color", 2, [](Block& b, int i) { b.color->b[i] ^= 512; }},
+      {"color_count", 1, [](Block& b, int i) { b.color->count[i] ^= 1; }},
+      {"evidence_even", 0.0625, [](Block& b, int i) { b.even_evidence->value[i] -= 0.0625f; }},
+      {"instance", 1, [](Block& b, int i) { b.instance->id[i] ^= 4; }},
+      {"instance_votes", 1, [](Block& b, int i) { b.instance->votes[i] -= 1; }},
+      {"weight", 0.5, [](Block& b, int i) { b.geometry->weight[i] = b.geometry->weight[i] + 0.5f; }},
+  };
+  const Map a = make();
+  for (const Case& c : cases) {
+    Map b = make();
+    const test::VoxelAt voxel = test::voxel_with_everything(b);
+    c.change(voxel.block, voxel.offset);
+    const MapDifference d = difference(a, b);
+    INFO(c.channel);
+    CHECK_FALSE(d.same_hash);
+    CHECK(channel(d, c.channel).max_difference == Approx(c.difference).epsilon(1e-5));
+    CHECK(beyond(d, 0));
+    CHECK(beyond(d, 0.99 * c.difference));
+    CHECK_FALSE(beyond(d, 1.01 * c.difference));
+    for (const ChannelDifference& other : d.channels) {
+      INFO(other.name);
+      CHECK(other.voxels_changed == (other.name == c.channel ? 1 : 0));
+      CHECK(other.voxels_only_a + other.voxels_only_b == 0);
+    }
+  }
+}
+
 TEST_CASE("a value that is not a number in one map only is beyond every tolerance") {
   const Map a = random_map({.seed = 2, .blocks = 2});
   Map b = random_map({.seed = 2, .blocks = 2});
@@ -94,6 +137,73 @@ TEST_CASE("classes are compared by name, and a flip is a voxel whose leading cla
   CHECK(channel(difference(a, b), "evidence/wood").voxels_only_a == 1);
   CHECK(channel(difference(a, b), "evidence/grass").voxels_only_b == 1);
   CHECK_FALSE(difference(a, b).settings.empty());
+}
+
+TEST_CASE("a flip is told from priors and touches too, as in the grid of labels") {
+  const auto wall = [] {
+    Map map = test::labelled_map(
+        0.02, {-0.2, -0.2, -0.1}, {0.2, 0.2, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
+        test::class_table({"wood", "ice"}), [](const Eigen::Vector3d&) { return 0; }, 1);
+    Property friction;
+    friction.name = "friction";
+    friction.priors = {{"wood", {0.4, 0.02, 50}}, {"ice", {0.1, 0.02, 50}}};
+    map.properties = PropertyTable({friction});
+    return map;
+  };
+  const Map before = wall();
+  Map touched = wall();
+  for (int i = 0; i < 8; ++i) {
+    TouchRequest r;
+    r.point_m = {0, 0, 0};
+    r.property = "friction";
+    r.value = 0.1;
+    r.stamp_s = i;
+    add_touch(touched, resolve_touch(touched, r));
+  }
+  // Every voxel that a touch speaks for and that vision called wood.
+  const std::vector<TouchView> views = touch_views(touched);
+  size_t flipped = 0;
+  for (const TouchView& view : views)
+    for (int i = 0; i < kBlockVoxels; ++i)
+      if (view.mask.test(i))
+        if (const Block* block = before.store.get(view.coord);
+            block != nullptr && class_belief(*block, i, before.classes).slot == 0)
+          flipped += view.label[size_t(i)] == 1;
+  REQUIRE(flipped > 100);
+  CHECK(difference(before, touched).class_flips == flipped);
+  CHECK(difference(touched, touched).class_flips == 0);
+
+  // Ice has so great a prior that one observation of wood does not outweigh it.
+  Map icy = wall();
+  std::vector<ClassInfo> classes = icy.classes.classes();
+  for (ClassInfo& c : classes)
+    if (c.name == "ice") c.prior = 5;
+  icy.classes = ClassTable(classes);
+  const MapDifference d = difference(before, icy);
+  CHECK(d.same_hash);
+  CHECK(d.class_flips > 100);
+}
+
+TEST_CASE("where tables differ, the first difference is named") {
+  Map a(0.02, 0.08), b(0.02, 0.08);
+  a.classes = ClassTable({{1, "wood", {}, false}, {2, "grass", {}, false}});
+  b.classes = ClassTable({{1, "wood", {}, false}, {3, "ice", {}, false}});
+  Property friction, stiffness;
+  friction.name = "friction";
+  stiffness.name = "stiffness";
+  a.properties = PropertyTable({friction});
+  b.properties = PropertyTable({friction, stiffness});
+  std::vector<std::string> lines = difference(a, b).settings;
+  REQUIRE(lines.size() == 2);
+  CHECK_THAT(lines[0], Catch::Matchers::Contains("row 2 is 'grass' (id 2) and 'ice' (id 3)"));
+  CHECK_THAT(lines[1], Catch::Matchers::Contains("only one has 'stiffness'"));
+  b.classes = ClassTable({{1, "wood", {}, false, 3}, {2, "grass", {}, false}});
+  friction.priors["wood"] = {0.3, 0.1, 4};
+  b.properties = PropertyTable({friction});
+  lines = difference(a, b).settings;
+  REQUIRE(lines.size() == 2);
+  CHECK_THAT(lines[0], Catch::Matchers::Contains("'wood' (id 1) has another prior"));
+  CHECK_THAT(lines[1], Catch::Matchers::Contains("'friction' has other priors"));
 }
 
 TEST_CASE("maps of another voxel size are different without comparing voxels") {

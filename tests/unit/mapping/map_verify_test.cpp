@@ -17,6 +17,15 @@ TEST_CASE("a sound map has no faults") {
 
 TEST_CASE("each broken invariant is named with its grid, its count and the voxel") {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  const auto unobserve = [](Map& m, Block& b) {
+    b.geometry->weight[100] = 0, b.geometry->tsdf[100] = float(m.truncation_m);
+  };
+  const auto touch_planes = [](Map& m, Block& b) -> TouchPlanes& {
+    Property friction;
+    friction.name = "friction";
+    m.properties = PropertyTable({friction});
+    return b.touch.emplace_back(TouchPlanes{0, m.store.new_plane(), m.store.new_plane(), m.store.new_plane()});
+  };
   struct Case {
     const char *grid, *broken;
     std::function<void(Map&, Block&)> harm;
@@ -47,6 +56,24 @@ TEST_CASE("each broken invariant is named with its grid, its count and the voxel
        [&](Map& m, Block& b) {
          b.evidence = {{9, m.store.new_plane()}};
        }},
+      {"evidence/class 1", "observed",
+       [&](Map& m, Block& b) {
+         unobserve(m, b);
+         b.evidence = {{1, m.store.new_plane()}};
+         b.evidence[0].counts->value[100] = 2;
+       }},
+      {"evidence_even", ">= 0", [&](Map& m, Block& b) { (b.even_evidence = m.store.new_plane())->value[100] = -1; }},
+      {"evidence_even", "observed",
+       [&](Map& m, Block& b) {
+         unobserve(m, b);
+         (b.even_evidence = m.store.new_plane())->value[100] = 1;
+       }},
+      {"instance", "votes", [&](Map& m, Block& b) { m.store.add_instance(b).votes[100] = 3; }},
+      {"touch", "in the table", [&](Map& m, Block& b) { touch_planes(m, b).property = 1; }},
+      {"touch/friction/n", ">= 0", [&](Map& m, Block& b) { touch_planes(m, b).n->value[100] = -1; }},
+      {"touch/friction/n", "finite", [&](Map& m, Block& b) { touch_planes(m, b).n->value[100] = kNan; }},
+      {"touch/friction/mean", "finite", [&](Map& m, Block& b) { touch_planes(m, b).mean->value[100] = kNan; }},
+      {"touch/friction/m2", "finite", [&](Map& m, Block& b) { touch_planes(m, b).m2->value[100] = kNan; }},
   };
   for (const Case& c : cases) {
     Map map = test::random_map({.seed = 8, .blocks = 3, .classes = 2});
@@ -97,4 +124,10 @@ TEST_CASE("a touched map is sound, and each way to break its touches is named") 
   REQUIRE(with_touch != nullptr);
   with_touch->touch[0].m2->value[3] = -1;
   CHECK(broken(map, "touch/friction/m2"));
+  map = touched();
+  // What is wrong with the counts is wrong with the belief, too.
+  map.touches.touches[0].request.model = TouchModel::mixture;
+  test::add_evidence(map, map.touches.touches[0].voxel, 1, std::numeric_limits<float>::infinity());
+  CHECK(broken(map, "evidence/ice"));
+  CHECK(broken(map, "alpha"));
 }

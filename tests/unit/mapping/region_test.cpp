@@ -316,7 +316,7 @@ TEST_CASE("a region's summary gives its area, extent and classes") {
   CHECK(summary.class_voxels[1] == 0);
   CHECK(summary.mixed_fraction == Approx(0.1).margin(0.02));
   CHECK(summary.unlabelled_voxels == 0);
-  CHECK(summary.pooled_belief[0] > summary.pooled_belief[2]);
+  CHECK(summary.class_voxels[0] > summary.class_voxels[2]);
   CHECK(summary.necks == 0);
   CHECK(summary.open_boundary_fraction > 0.5);
 }

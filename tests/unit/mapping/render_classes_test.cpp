@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "mapping/surface/render.h"
 #include "tests/support/analytic_map.h"
 
 using namespace felt;

@@ -6,9 +6,11 @@
 #include <utility>
 #include <vector>
 
+#include "inference/information_gain.h"
 #include "inference/mixture.h"
 #include "mapping/maps/merge.h"
 #include "mapping/touch/touch_mixture.h"
+#include "mapping/touch/touch_suggestion.h"
 #include "mapping/touch/touch_update.h"
 #include "mapping/touch/touch_view.h"
 #include "tests/support/labelled_map.h"
@@ -113,6 +115,79 @@ TEST_CASE("a touched region has the scalar material posterior of its pooled beli
     CHECK(outside.nig[0][c] == nig_priors(map.properties[0], map.classes)[c]);
   }
   CHECK(inside.log_evidence[0] == Approx(expected.belief.log_evidence).epsilon(1e-12));
+}
+
+TEST_CASE("readings with noise of their own have the scalar posterior that knows it, in either model") {
+  const std::vector<double> psi{0.3, 0.27}, sigma{0.1, 0.02};
+  for (const TouchModel model : {TouchModel::material, TouchModel::mixture}) {
+    Map map = two_floors(snow, wood, 7);
+    for (size_t n = 0; n < psi.size(); ++n) {
+      TouchRequest request = reading(-0.2, 0, psi[n], double(n), model);
+      request.sigma = sigma[n];
+      touch(map, request);
+    }
+    const std::vector<Nig> priors = nig_priors(map.properties[0], map.classes);
+    Beliefs beliefs(map);
+    const Belief found = beliefs.at({-10, 0, 0});
+    if (model == TouchModel::material) {
+      const std::vector<double> pooled = pooled_belief(map, map.touches.touches[0].region);
+      const MaterialPosterior expected = material_posterior(pooled, priors, psi, sigma, 0.5);
+      for (size_t c = 0; c < 8; ++c) CHECK(found.class_probability[c] == Approx(expected.belief.p[c]).epsilon(1e-12));
+      CHECK(found.log_evidence[0] == Approx(expected.belief.log_evidence).epsilon(1e-12));
+      continue;
+    }
+    std::vector<double> a(8, 1.0);
+    a[snow] += 7;
+    const MixtureUpdate once = mixture_update(a, priors, psi[0], sigma[0]),
+                        twice = mixture_update(once.a, once.nig, psi[1], sigma[1]);
+    for (size_t c = 0; c < 8; ++c) {
+      CHECK(found.concentration[c] == Approx(twice.a[c]).epsilon(1e-12));
+      CHECK(found.nig[0][c].tau == Approx(twice.nig[c].tau).epsilon(1e-12));
+    }
+  }
+}
+
+TEST_CASE("readings of two properties in one region multiply, with the correlation that a touch names") {
+  Map map = two_floors(snow, wood, 7);
+  Property warmth;
+  warmth.name = "warmth";
+  for (const std::string& name : kMaterials) warmth.priors[name] = {280, 5, 20};
+  warmth.priors["snow"] = {271, 2, 20};
+  warmth.priors["ice"] = {273, 2, 20};
+  map.properties = PropertyTable({friction()[0], warmth});
+  touch(map, reading(-0.2, 0, 0.25));
+  const std::vector<double> warm{274, 272};
+  for (size_t n = 0; n < warm.size(); ++n) {
+    TouchRequest request = reading(-0.2, 0, warm[n], 1 + double(n));
+    request.property = "warmth";
+    request.rho = 0.2;
+    touch(map, request);
+  }
+  const std::vector<double> pooled = pooled_belief(map, map.touches.touches[0].region);
+  const std::vector<Nig> of_friction = nig_priors(map.properties[0], map.classes),
+                         of_warmth = nig_priors(map.properties[1], map.classes);
+  std::vector<double> log_likelihood;
+  for (size_t c = 0; c < 8; ++c)
+    log_likelihood.push_back(material_class(of_friction[c], statistics_of(std::vector{0.25}), 0.5).log_evidence +
+                             material_class(of_warmth[c], statistics_of(warm), 0.2).log_evidence);
+  const ClassPosterior expected = class_posterior(pooled, log_likelihood);
+  const std::vector<double> found = Beliefs(map).at({-10, 0, 0}).class_probability;
+  for (size_t c = 0; c < 8; ++c) CHECK(found[c] == Approx(expected.p[c]).epsilon(1e-12));
+}
+
+TEST_CASE("a class that vision all but rules out is believed after enough readings") {
+  Map map = two_floors(snow, wood, 0);
+  std::vector<ClassInfo> classes = map.classes.classes();
+  for (ClassInfo& c : classes) c.prior = 1e-12;
+  map.classes = ClassTable(classes);
+  for (int n = 0; n < 50; ++n) another_frame(map, snow);
+  for (int n = 0; n < 8; ++n) {
+    // Eight readings so little correlated say 4.5e7 times as much for ice; vision says 5e13 times as much for snow.
+    TouchRequest request = reading(-0.2, 0, 0.15, n);
+    request.rho = 0.2;
+    touch(map, request);
+  }
+  CHECK(most_probable_class(Beliefs(map).at({-10, 0, 0}).class_probability) == ice);
 }
 
 TEST_CASE("statistics planes hold the readings that cover a voxel, and only in touched blocks") {
@@ -274,6 +349,23 @@ TEST_CASE("a touch says what it changed, and flags a reading that no class expla
   CHECK(strange.tail_probability < 1e-3);
 }
 
+TEST_CASE("a reading surprises by as much as its own noise leaves it") {
+  for (const TouchModel model : {TouchModel::material, TouchModel::mixture}) {
+    Map map = two_floors(snow, wood, 20);
+    TouchRequest vague = reading(-0.2, 0, 1.5, 0, model), precise = reading(-0.2, 0, 1.5, 1, model);
+    vague.sigma = 3;
+    const TouchEffect first = apply_touch(map, resolve_touch(map, vague));
+    CHECK_FALSE(first.flags.surprising);
+    CHECK_FALSE(first.flags.not_one_material);
+    CHECK(first.tail_probability > 0.5);
+    CHECK(first.after.class_probability[snow] == Approx(first.before.class_probability[snow]).epsilon(0.01));
+    // The noise of an earlier reading excuses no later one.
+    const TouchEffect second = apply_touch(map, resolve_touch(map, precise));
+    CHECK(second.flags.surprising);
+    CHECK(second.tail_probability < 1e-3);
+  }
+}
+
 TEST_CASE("views hold the label and the property of touched voxels") {
   Map map = two_floors(snow, wood, 20);
   touch(map, reading(-0.2, 0, 0.15));
@@ -290,6 +382,34 @@ TEST_CASE("views hold the label and the property of touched voxels") {
       REQUIRE(view.sd[0][size_t(i)] == Approx(std::sqrt(*variance(belief.next_reading[0]))).epsilon(1e-4));
     });
   CHECK(voxels == map.touches.touches[0].region.voxels() + map.touches.touches[1].region.voxels());
+}
+
+TEST_CASE("a suggestion says what a touch there would teach") {
+  Map map = two_floors(snow, wood, 7);
+  const std::vector<Suggestion> suggestions = suggest_touches(map, "friction", {});
+  REQUIRE(suggestions.size() == 2);
+  for (const Suggestion& s : suggestions) {
+    INFO("at x = " << s.point_m.x());
+    CHECK(std::abs(s.point_m.z()) < 1e-6);
+    CHECK(s.normal.z() == Approx(1));
+    const auto there = [&](double value) { return resolve_touch(map, reading(s.point_m.x(), s.point_m.y(), value)); };
+    const Region region = there(0.3).region;
+    CHECK(double(s.voxels) == Approx(double(region.voxels())).epsilon(1e-3));
+    // 20 columns of voxels to the left of x = 0, 21 from there on, 41 rows.
+    CHECK(s.area_m2 == Approx((s.point_m.x() < 0 ? 20 : 21) * 41 * kVoxel * kVoxel).epsilon(0.03));
+    const Belief belief = Beliefs(map).of(region, {});
+    CHECK(s.gain_nat == Approx(information_gain(belief.next_reading[0]).value).epsilon(1e-9));
+    REQUIRE_FALSE(s.outcomes.empty());
+    CHECK(s.outcomes[0].slot == (s.point_m.x() < 0 ? snow : wood));
+    for (const Outcome& outcome : s.outcomes) {
+      CHECK(outcome.probability == Approx(belief.class_probability[size_t(outcome.slot)]).epsilon(1e-9));
+      const TouchEffect effect = apply_touch(map, there(outcome.reading));
+      undo_touch(map, effect.id);
+      for (size_t c = 0; c < 8; ++c)
+        CHECK(outcome.class_probability[c] == Approx(effect.after.class_probability[c]).epsilon(1e-9));
+    }
+  }
+  CHECK(suggestions[0].gain_nat * suggestions[0].area_m2 >= suggestions[1].gain_nat * suggestions[1].area_m2);
 }
 
 TEST_CASE("untouched segments keep every bit") {
@@ -344,6 +464,27 @@ TEST_CASE("joining two journals gives every touch once, whichever comes first") 
   CHECK(both.touches[0].request.stamp_s == 1);
   CHECK(both.touches[2].request.stamp_s == 3);
   CHECK(journal_digest(both) == journal_digest(joined(right, left)));
+}
+
+TEST_CASE("a touch that two journals share is undone where both say so, and has the regions of both") {
+  Map map = two_floors(snow, wood, 4);
+  const Touch touch = resolve_touch(map, reading(-0.2, 0, 0.3)), elsewhere = resolve_touch(map, reading(0.2, 0, 0.3));
+  REQUIRE_FALSE(touch.region == elsewhere.region);
+  for (const bool undone_left : {false, true})
+    for (const bool undone_right : {false, true}) {
+      INFO("undone left " << undone_left << ", right " << undone_right);
+      TouchJournal left, right;
+      const uint64_t id = insert(left, touch);
+      REQUIRE(insert(right, touch) == id);
+      left.find(id)->undone = undone_left;
+      right.find(id)->undone = undone_right;
+      right.find(id)->region = elsewhere.region;
+      for (const TouchJournal& both : {joined(left, right), joined(right, left)}) {
+        REQUIRE(both.touches.size() == 1);
+        CHECK(both.touches[0].undone == (undone_left && undone_right));
+        CHECK((both.touches[0].region == united(touch.region, elsewhere.region)));
+      }
+    }
 }
 
 TEST_CASE("a merged map holds the touches of both maps") {

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+namespace felt {
+
+/// A number in printf's words; `format` takes one double.
+std::string number_text(double value, const char* format = "%g");
+
+/// The items with ", " between them, each as `text(item)` says it (a member will do: `&Property::name`); behind `most`
+/// of them " and N more".
+template <typename Range, typename Text = std::identity>
+std::string listed(const Range& items, const Text& text = {}, size_t most = SIZE_MAX) {
+  std::string list;
+  size_t count = 0;
+  for (const auto& item : items) {
+    if (count++ >= most) continue;
+    if (count > 1) list += ", ";
+    list += std::invoke(text, item);
+  }
+  if (count > most) list += " and " + std::to_string(count - most) + " more";
+  return list;
+}
+
+}  // namespace felt
