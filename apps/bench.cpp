@@ -1,9 +1,9 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <variant>
 
 #include "apps/command.h"
@@ -11,7 +11,9 @@
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
 #include "core/error.h"
+#include "core/median.h"
 #include "core/simd.h"
+#include "core/stopwatch.h"
 #include "io/sequence/open_sequence.h"
 #include "mapping/fusion/tsdf_integrator.h"
 #include "mapping/surface/marching_cubes.h"
@@ -19,7 +21,6 @@
 namespace felt::apps {
 namespace {
 using Json = nlohmann::ordered_json;
-using Clock = std::chrono::steady_clock;
 
 struct BenchOptions : CommonOptions {
   std::string sequence;
@@ -27,15 +28,6 @@ struct BenchOptions : CommonOptions {
   int64_t frames = 100;
   int repetitions = 3;
 };
-
-double milliseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + long(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 /// Usable frames from the start of a sequence, and what decoding one took.
 struct DecodedFrames {
@@ -46,10 +38,10 @@ struct DecodedFrames {
 DecodedFrames decode(const SequenceReader& sequence, int64_t most) {
   DecodedFrames decoded;
   for (int64_t i = 0; i < std::min(sequence.size(), most); ++i) {
-    const auto start = Clock::now();
+    const Stopwatch watch;
     ReadResult result = sequence.read(i);
     if (Frame* frame = std::get_if<Frame>(&result)) {
-      decoded.decode_ms.push_back(milliseconds_since(start));
+      decoded.decode_ms.push_back(1e3 * watch.seconds());
       decoded.frames.push_back(std::move(*frame));
     }
   }
@@ -72,9 +64,9 @@ Json fusion_cost(const DecodedFrames& decoded, const ClassTable& classes, double
     }
     if (repetition + 1 < repetitions) continue;
     row["fuse_ms"] = median(frame_ms);
-    const auto start = Clock::now();
+    const Stopwatch watch;
     const size_t triangles = extract_mesh(map).triangles.size();
-    row["mesh_ms"] = milliseconds_since(start);
+    row["mesh_ms"] = 1e3 * watch.seconds();
     row["triangles"] = triangles;
     row["blocks"] = map.store.size();
     row["bytes"] = map.store.geometry_bytes() + map.store.color_bytes() + map.store.plane_bytes();

@@ -8,9 +8,11 @@
 #include "apps/exit_code.h"
 #include "apps/output_files.h"
 #include "apps/progress.h"
+#include "apps/reading_options.h"
 #include "core/error.h"
 #include "io/files/atomic_file.h"
 #include "io/sequence/open_sequence.h"
+#include "io/sequence/skip_reasons.h"
 #include "io/tables/confusion_file.h"
 #include "mapping/labels/label_calibration.h"
 
@@ -113,11 +115,11 @@ Json largest_confusions(const ConfusionCounts& counts, const ClassTable& classes
 
 int run(const CalibrateOptions& o) {
   require_no_file(o.out, o.overwrite);
-  SequenceOptions reading;
-  reading.format = o.format;
-  reading.labels_dir = o.labels, reading.probs_dir = o.probs, reading.classes_file = o.classes;
+  ReadingArguments arguments;
+  arguments.format = o.format, arguments.frames = o.frames;
+  arguments.labels = o.labels, arguments.probs = o.probs, arguments.classes = o.classes;
+  SequenceOptions reading = resolve(arguments);
   reading.read_color = false, reading.read_instances = false;
-  if (!o.frames.empty()) reading.frames = parse_frame_selection(o.frames, "--frames");
   const auto predicted = open_sequence(o.sequence, reading);
   const ClassTable& classes = predicted->info().classes;
   if (classes.empty())
@@ -127,10 +129,9 @@ int run(const CalibrateOptions& o) {
   ConfusionCounts all = learned.even;
   all += learned.odd;
   if (!(all.total() > 0)) {
-    std::string why = std::to_string(predicted->size()) + " frames";
-    for (const auto& [reason, count] : learned.skipped) why += ", " + std::to_string(count) + " " + reason;
-    throw FormatError(
-        describe_mismatch(o.reference.string(), "true labels", "pixels with a predicted and a true class", why));
+    const std::string frames = std::to_string(predicted->size()) + " frames", reasons = skipped_text(learned.skipped);
+    throw FormatError(describe_mismatch(o.reference.string(), "true labels", "pixels with a predicted and a true class",
+                                        reasons.empty() ? frames : frames + ", " + reasons));
   }
   const ConfusionScores forward = score_confusion(learned.even, learned.odd),
                         backward = score_confusion(learned.odd, learned.even);

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <Eigen/Geometry>
 #include <string>
+#include <vector>
 
 #include "core/camera.h"
+#include "io/sequence/sequence_options.h"
 
 namespace felt::apps {
 
@@ -16,7 +19,17 @@ struct CameraOptions {
 /// Adds --intrinsics and --size.
 void add_camera_options(CLI::App& command, CameraOptions& options);
 
-/// Throws ConfigError naming every option that cannot be used.
+/// Throws CLI::ValidationError naming every option that cannot be read.
 PinholeCamera camera_of(const CameraOptions& options);
+
+/// Where a surface is looked at from, and with which camera.
+struct Viewpoints {
+  PinholeCamera camera;
+  std::vector<Eigen::Isometry3d> T_world_camera;
+};
+
+/// Of a recorded sequence (a folder): its camera and the poses of its readable frames, both as `reading` has them. Of a
+/// file with one pose a line: those, and the camera of `options`.
+Viewpoints read_viewpoints(const std::string& trajectory, const CameraOptions& options, const SequenceOptions& reading);
 
 }  // namespace felt::apps

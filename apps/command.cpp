@@ -59,8 +59,8 @@ CLI::App& add_command(CLI::App& app, const CommandText& text, CommonOptions& com
   return command;
 }
 
-CLI::Option* add_switch(CLI::App& command, const std::string& names, std::optional<bool>& value,
-                        const std::string& text) {
+CLI::Option* add_switch(CLI::App& command, const std::string& name, std::optional<bool>& value, const std::string& text,
+                        bool meaning) {
   // Checked before CLI11 converts it, which throws what is no usage error.
   const auto is_switch = [](const std::string& word) {
     try {
@@ -72,7 +72,7 @@ CLI::Option* add_switch(CLI::App& command, const std::string& names, std::option
   };
   return command
       .add_flag_function(
-          names, [&value](int64_t count) { value = count > 0; }, text)
+          name, [&value, meaning](int64_t count) { value = (count > 0) == meaning; }, text)
       ->check(is_switch);
 }
 

@@ -32,10 +32,11 @@ struct CommandText {
 /// exceptions (core/error.h).
 CLI::App& add_command(CLI::App& app, const CommandText& text, CommonOptions& common, std::function<int()> run);
 
-/// A flag that is absent, not false, where it is not given, so that it overrules what a file says only where it is:
-/// `names` as CLI11 takes them ("--x,!--no-x"); --x=false is false.
-CLI::Option* add_switch(CLI::App& command, const std::string& names, std::optional<bool>& value,
-                        const std::string& text);
+/// A flag that is absent, not false, where it is not given, so that it overrules what a file says only where it is.
+/// `--x` makes it `meaning`, `--x=false` the opposite. CLI11's own negated flags ("!--no-x") throw what is no usage
+/// error where their value is too large a number.
+CLI::Option* add_switch(CLI::App& command, const std::string& name, std::optional<bool>& value, const std::string& text,
+                        bool meaning = true);
 
 /// An option that is given as one of `names`: help and errors list them. `value`: an Enum, or an optional of it.
 template <typename Enum, typename Value>

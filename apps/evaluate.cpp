@@ -10,7 +10,9 @@
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
 #include "apps/output_files.h"
+#include "apps/problems.h"
 #include "apps/progress.h"
+#include "apps/reading_options.h"
 #include "apps/run_settings.h"
 #include "apps/touch_options.h"
 #include "core/error.h"
@@ -19,7 +21,7 @@
 #include "io/pictures/reliability_plot.h"
 #include "io/readings/touches.h"
 #include "io/sequence/open_sequence.h"
-#include "io/sequence/pose_list.h"
+#include "io/sequence/skip_reasons.h"
 #include "io/tables/class_table_file.h"
 #include "mapping/surface/marching_cubes.h"
 
@@ -48,11 +50,11 @@ struct Evaluated {
 
 /// How a sequence is read, be it for its labels or for its poses.
 SequenceOptions reading_of(const EvaluateCommand& command) {
-  SequenceOptions options;
+  ReadingArguments arguments;
+  arguments.format = command.format, arguments.frames = command.frames;
+  if (command.intrinsics->count() > 0) arguments.intrinsics = command.camera.intrinsics;
+  SequenceOptions options = resolve(arguments);
   options.read_color = options.read_instances = false;
-  options.format = command.format;
-  if (command.intrinsics->count() > 0) options.intrinsics = parse_intrinsics(command.camera.intrinsics, "--intrinsics");
-  if (!command.frames.empty()) options.frames = parse_frame_selection(command.frames, "--frames");
   return options;
 }
 
@@ -63,20 +65,10 @@ std::unique_ptr<SequenceReader> open_reference(const EvaluateCommand& command, c
   return open_sequence(path, options);
 }
 
-/// Poses of a file with the camera given, or both of a sequence.
 void read_cameras(EvaluateCommand& command) {
-  ObservingCameras& cameras = command.cameras;
-  if (!fs::is_directory(command.trajectory)) {
-    cameras.camera = camera_of(command.camera);
-    cameras.T_world_camera = read_poses(command.trajectory);
-    return;
-  }
-  const auto sequence = open_sequence(command.trajectory, reading_of(command));
-  cameras.camera = sequence->info().camera;
-  for (int64_t i = 0; i < sequence->size(); ++i) {
-    const ReadResult result = sequence->read(i);
-    if (const auto* frame = std::get_if<Frame>(&result)) cameras.T_world_camera.push_back(frame->T_world_camera);
-  }
+  Viewpoints views = read_viewpoints(command.trajectory, command.camera, reading_of(command));
+  command.cameras.camera = views.camera;
+  command.cameras.T_world_camera = std::move(views.T_world_camera);
 }
 
 /// The evaluated mesh may carry the labels under the reference's name or, as ours do, at its vertices.
@@ -131,10 +123,9 @@ SequenceLabels evaluate_sequence_labels(const EvaluateCommand& command, const Ev
              slots, command.class_images);
   }
   if (result.scores.views == 0) {
-    std::string found = "none";
-    for (const auto& [reason, frames] : result.skipped)
-      found.append(found == "none" ? ": " : ", ").append(std::to_string(frames) + " " + reason);
-    throw FormatError(describe_mismatch(command.reference_labels, "frames", "at least one with labels", found));
+    const std::string reasons = skipped_text(result.skipped);
+    throw FormatError(describe_mismatch(command.reference_labels, "frames", "at least one with labels",
+                                        reasons.empty() ? "none" : "none: " + reasons));
   }
   return result;
 }
@@ -159,18 +150,23 @@ LabelScores evaluate_mesh_labels(const EvaluateCommand& command, const Evaluated
   return scores;
 }
 
+/// How good forecasts of readings are, by property, and why some readings had none.
+struct ReadingScores {
+  std::map<std::string, PropertyScores> of_property;
+  std::map<std::string, int64_t> refused;
+};
+
 /// Forecasts of the map at the places of recorded readings that it has not been given.
-Json evaluate_readings(const EvaluateCommand& command, Map& map) {
+ReadingScores evaluate_readings(const EvaluateCommand& command, Map& map) {
   use_properties(map, command.properties);
   const VoxelBeliefs beliefs(map);
   RegionSettings settings;
   settings.min_weight = least_observed_weight(map);
-  std::map<std::string, PropertyScores> scores;
-  std::map<std::string, int64_t> refused;
+  ReadingScores scores;
   for (const RecordedTouch& reading : read_touches(command.reference_readings)) {
     const auto property = map.properties.index_of(reading.property);
     if (!property || !reading.point_m) {
-      ++refused[property ? "no point in the world" : "unknown property"];
+      ++scores.refused[property ? "no point in the world" : "unknown property"];
       continue;
     }
     try {
@@ -178,16 +174,20 @@ Json evaluate_readings(const EvaluateCommand& command, Map& map) {
       const StudentTMixture next =
           beliefs.next_reading({map.store.find(block_of_voxel(voxel)), uint16_t(offset_in_block(voxel))}, *property);
       if (next.weight.empty())
-        ++refused["no class with a prior"];
+        ++scores.refused["no class with a prior"];
       else
-        scores[reading.property].add(reading.value, next);
+        scores.of_property[reading.property].add(reading.value, next);
     } catch (const TouchError&) {
-      ++refused["not on a labelled surface"];
+      ++scores.refused["not on a labelled surface"];
     }
   }
+  return scores;
+}
+
+Json readings_json(const ReadingScores& scores) {
   Json json = Json::object();
-  for (const auto& [name, s] : scores) json[name] = property_json(s);
-  if (!refused.empty()) json["refused"] = refused;
+  for (const auto& [name, s] : scores.of_property) json[name] = property_json(s);
+  if (!scores.refused.empty()) json["refused"] = scores.refused;
   return json;
 }
 
@@ -213,6 +213,17 @@ void print_labels(const LabelScores& s, const char* of) {
                 s.images.ssim(), s.images.binary_cross_entropy());
 }
 
+void print_readings(const ReadingScores& scores) {
+  for (const auto& [name, s] : scores.of_property) {
+    std::printf("%-19s mean error %.4f   NLL %.4f   CRPS %.4f   of %llu readings\n", name.c_str(), s.mae(), s.nll(),
+                s.crps(), static_cast<unsigned long long>(s.count()));
+    std::printf("coverage            of 50 %% intervals %.1f %%   of 90 %% intervals %.1f %%\n", 100 * s.coverage(0),
+                100 * s.coverage(1));
+  }
+  for (const auto& [reason, readings] : scores.refused)
+    std::printf("not counted         %lld: %s\n", static_cast<long long>(readings), reason.c_str());
+}
+
 void require_depth_range(const ObservingCameras& cameras) {
   if (cameras.max_depth_m > cameras.min_depth_m) return;
   throw ConfigError(describe_mismatch("evaluate", "--max-depth, metres",
@@ -221,9 +232,9 @@ void require_depth_range(const ObservingCameras& cameras) {
 }
 
 void check(const EvaluateCommand& c) {
-  std::vector<std::string> problems;
+  Problems problems;
   const auto need = [&](bool good, const char* option, const char* expected) {
-    if (!good) problems.push_back(describe_mismatch("evaluate", option, expected, "none"));
+    if (!good) problems.add_of_usage(describe_mismatch("evaluate", option, expected, "none"));
   };
   if (c.reference_mesh.empty() && c.reference_labels.empty() && c.reference_readings.empty())
     throw CLI::RequiredError("--reference-mesh, --reference-labels or --reference-readings");
@@ -244,7 +255,8 @@ void check(const EvaluateCommand& c) {
        "a map (.vdb) and --reference-labels");
   need(c.intrinsics->count() == 0 || of_sequence || !c.trajectory.empty(), "--intrinsics",
        "--trajectory or --reference-labels");
-  if (!problems.empty()) throw ConfigError(problems);
+  problems.throw_if_any();
+  reading_of(c);  // what it cannot read is said before anything is loaded
   require_ending(c.reliability, ".svg");
   // A map may bring a range of its own.
   if (!is_map || (c.min_depth->count() > 0 && c.max_depth->count() > 0)) require_depth_range(c.cameras);
@@ -313,9 +325,10 @@ int evaluate(EvaluateCommand& command) {
     if (print) print_labels(labels.scores, "the views");
   }
   if (!command.reference_readings.empty()) {
-    json["properties"] = evaluate_readings(command, *evaluated.map);
+    const ReadingScores readings = evaluate_readings(command, *evaluated.map);
+    json["properties"] = readings_json(readings);
     definitions["properties"] = property_definitions();
-    if (print) std::printf("properties          %s\n", json["properties"].dump().c_str());
+    if (print) print_readings(readings);
   }
   if (!command.reliability.empty()) {
     if (!calibration || calibration->count() == 0)

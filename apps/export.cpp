@@ -89,8 +89,7 @@ Part part_of_map(const Map& map, const ExportOptions& o) {
   if (!o.segment_at.empty()) {
     const RegionSettings settings = o.segment.resolved(map);
     const Contact contact = find_contact(map, point_of(o.segment_at), settings);
-    const std::optional<ViewMask> view = o.segment.view();
-    only(part.things, view ? find_region(map, *view, settings, &contact) : find_region(map, contact, settings));
+    only(part.things, o.segment.region_at(map, contact, settings));
   }
   part.voxels = part.things;
   if (!o.box_m.empty()) {

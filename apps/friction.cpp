@@ -5,12 +5,14 @@
 #include <numbers>
 #include <string>
 
+#include "apps/belief_report.h"
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/output_files.h"
 #include "apps/run_settings.h"
 #include "apps/touch_options.h"
+#include "core/text.h"
 #include "io/files/atomic_file.h"
 #include "io/map_file/map_file.h"
 #include "io/readings/friction_log.h"
@@ -51,11 +53,9 @@ int run_friction(const FrictionOptions& options) {
       std::hypot(reading.kinetic_sd, (1 + reading.kinetic_mean * reading.kinetic_mean) * normal_sd_rad);
   if (!options.plot.empty()) write_plot_svg(options.plot, friction_plots(log, reading));
   const double stamp_s = log.time_s[reading.slide_begin];
-  char stamp[64], value[64];
-  std::snprintf(stamp, sizeof stamp, "%.6f", stamp_s);
-  std::snprintf(value, sizeof value, "%.4f,%.4g", reading.kinetic_mean, reading.kinetic_sd);
-  const std::string touch =
-      std::string(stamp) + "," + (options.at.empty() ? "x,y,z" : options.at) + ",friction," + value;
+  const std::string touch = number_text(stamp_s, "%.6f") + "," + (options.at.empty() ? "x,y,z" : options.at) +
+                            ",friction," + number_text(reading.kinetic_mean, "%.4f") + "," +
+                            number_text(reading.kinetic_sd, "%.4g");
   const std::string touches = "stamp,x,y,z,property,value,sigma\n" + touch + "\n";
   if (!options.touch.empty()) write_file_atomically(options.touch, touches);
   if (options.json) {

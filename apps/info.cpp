@@ -8,11 +8,13 @@
 #include <type_traits>
 #include <vector>
 
+#include "apps/belief_report.h"
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/reading_options.h"
 #include "core/error.h"
+#include "core/text.h"
 #include "io/map_file/map_file.h"
 #include "io/map_file/map_grids.h"
 #include "io/map_file/map_metadata.h"
@@ -25,8 +27,6 @@ namespace felt::apps {
 namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 Json classes_json(const ClassTable& table) {
   Json classes = Json::array();
@@ -132,7 +132,7 @@ Json describe_map(const fs::path& file, bool with_grids) {
   json["blocks"] = map.store.size();
   json["active_voxels"] = active_voxel_count(map);
   if (!bounds_m.isEmpty())
-    json["bounds_m"] = {{"min", vector_json(bounds_m.min())}, {"max", vector_json(bounds_m.max())}};
+    json["bounds_m"] = {{"min", point_json(bounds_m.min())}, {"max", point_json(bounds_m.max())}};
   json["bytes"] = {
       {"tsdf", map.store.geometry_bytes()}, {"color", map.store.color_bytes()}, {"classes", class_bytes(map)}};
   json["frames"] = frame_count(map.frames);
@@ -173,15 +173,58 @@ Json describe_sequence(const fs::path& folder, const SequenceOptions& options) {
   return json;
 }
 
-/// "name: value" lines, nested ones indented.
+/// A value in a line: lists with commas, lists of lists with semicolons.
+std::string text_of(const Json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_number_float()) return number_text(value.get<double>(), "%.9g");
+  if (value.is_null() || (value.is_structured() && value.empty())) return "none";
+  if (!value.is_array()) return value.dump();
+  std::string text;
+  for (const Json& item : value) text += (text.empty() ? "" : value[0].is_array() ? "; " : ", ") + text_of(item);
+  return text;
+}
+
+bool has_lines(const Json& value) {
+  return !value.empty() && (value.is_object() || (value.is_array() && value[0].is_object()));
+}
+
+/// What a text holds where that is JSON, as settings within settings are kept.
+Json opened(const Json& value) {
+  if (!value.is_string()) return value;
+  const Json parsed = Json::parse(value.get<std::string>(), nullptr, false);
+  return parsed.is_structured() ? parsed : value;
+}
+
+/// Runs of frames, [first, step, count] each, in words.
+std::string frames_text(const Json& runs) {
+  return listed(runs, [](const Json& run) {
+    const auto first = run[0].get<int64_t>(), step = run[1].get<int64_t>(), count = run[2].get<int64_t>();
+    if (count == 1) return std::to_string(first);
+    const std::string range = std::to_string(first) + " to " + std::to_string(first + step * (count - 1));
+    return step == 1 ? range : range + " in steps of " + std::to_string(step);
+  });
+}
+
+/// "name: value" lines, nested ones indented; of a list of things a line each, below which stands what is nested.
 void print_lines(const Json& json, const std::string& indent) {
-  for (const auto& [key, value] : json.items()) {
+  for (const auto& [key, written] : json.items()) {
+    const Json value = opened(written);
+    std::printf("%s%s:%s\n", indent.c_str(), key.c_str(), has_lines(value) ? "" : (" " + text_of(value)).c_str());
+    if (!has_lines(value)) continue;
     if (value.is_object()) {
-      std::printf("%s%s:\n", indent.c_str(), key.c_str());
       print_lines(value, indent + "  ");
-    } else {
-      std::printf("%s%s: %s\n", indent.c_str(), key.c_str(),
-                  value.is_string() ? value.get<std::string>().c_str() : value.dump().c_str());
+      continue;
+    }
+    for (const Json& thing : value) {
+      std::string line;
+      Json nested = Json::object();
+      for (const auto& [name, part] : thing.items())
+        if (has_lines(part))
+          nested[name] = part;
+        else
+          line += (line.empty() ? "" : ", ") + name + " " + text_of(part);
+      std::printf("%s  %s\n", indent.c_str(), line.c_str());
+      print_lines(nested, indent + "    ");
     }
   }
 }
@@ -204,11 +247,13 @@ int run(const fs::path& path, const ReadingArguments& reading, bool with_grids, 
   if (is_map && !pictures.empty())
     throw ConfigError(describe_mismatch("--pictures", "what to describe", "a sequence", path.string()));
   const SequenceOptions options = resolve(reading);
-  const Json json = is_map ? describe_map(path, with_grids) : describe_sequence(path, options);
+  Json json = is_map ? describe_map(path, with_grids) : describe_sequence(path, options);
   if (!pictures.empty()) write_pictures(path, options, pictures);
   if (common.json) {
     print_json(json);
   } else {
+    if (is_map)
+      for (Json& recording : json["recordings"]) recording["frames"] = frames_text(recording["frames"]);
     print_lines(json, "");
   }
   return kDone;

@@ -12,8 +12,8 @@
 #include "apps/exit_code.h"
 #include "core/error.h"
 #include "core/simd.h"
+#include "core/text.h"
 #include "io/files/system_memory.h"
-#include "io/settings/reconstruct_config.h"
 
 namespace felt::apps {
 namespace {
@@ -114,12 +114,9 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     // CLI11 would only say that a subcommand is missing.
     const std::vector<std::string> unknown = app.remaining();
-    if (app.get_subcommands().empty() && !unknown.empty()) {
-      std::string names;
-      for (const CLI::App* command : app.get_subcommands({}))
-        names.append(names.empty() ? "" : ", ").append(command->get_name());
-      return fail(kUsage, "'" + unknown.front() + "': expected one of " + names + " (see feltmap --help)");
-    }
+    if (app.get_subcommands().empty() && !unknown.empty())
+      return fail(kUsage, "'" + unknown.front() + "': expected one of " +
+                              listed(app.get_subcommands({}), &CLI::App::get_name) + " (see feltmap --help)");
     const CLI::App& command = app.get_subcommands().empty() ? app : *app.get_subcommands().front();
     const std::string misspelt = misspelt_option(command);
     return fail(kUsage, (misspelt.empty() ? e.what() : misspelt) + " (see feltmap --help)");

@@ -1,7 +1,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
@@ -18,6 +17,8 @@
 #include "apps/output_files.h"
 #include "apps/run_settings.h"
 #include "core/error.h"
+#include "core/stopwatch.h"
+#include "core/text.h"
 #include "io/map_file/map_file.h"
 #include "mapping/maps/merge.h"
 
@@ -53,14 +54,13 @@ void warn_of_what_does_not_add(const std::vector<Map>& maps, const MergeOptions&
   if (maps.size() < 2) return;
   if (any_run_with(maps, "carve"))
     spdlog::warn("maps made with --carve: what one of them saw free does not erase what only another holds");
-  std::string different;
+  std::vector<std::string> different;
   for (const char* key : {"distance", "weight", "dropoff_start_vox", "min_depth_m", "max_depth_m", "color_band_vox",
                           "label_band_vox", "label_evidence"})
     if (const std::set<std::string> values = values_of_runs(maps, key); values.size() > 1)
-      different +=
-          (different.empty() ? "" : "; ") + std::string(key) + ": " + *values.begin() + " and " + *values.rbegin();
+      different.push_back(std::string(key) + ": " + *values.begin() + " and " + *values.rbegin());
   if (!different.empty())
-    spdlog::warn("maps fused with different settings ({}): what is added up was not measured alike", different);
+    spdlog::warn("maps fused with different settings ({}): what is added up was not measured alike", listed(different));
   const auto any_above_zero = [&](const char* key) {
     const std::set<double> numbers = numbers_of_runs(maps, key);
     return !numbers.empty() && *numbers.rbegin() > 0;
@@ -78,19 +78,16 @@ void warn_of_what_does_not_add(const std::vector<Map>& maps, const MergeOptions&
 }
 
 int run(const Options& options) {
-  using Clock = std::chrono::steady_clock;
-  const auto seconds = [](Clock::time_point a, Clock::time_point b) {
-    return std::chrono::duration<double>(b - a).count();
-  };
   // From before it is read: a map may grow in place, and what others do to it meanwhile would be lost.
   std::optional<MapWriting> writing;
   if (std::filesystem::exists(options.out)) writing.emplace(options.out, options.overwrite);
-  const auto start = Clock::now();
+  const Stopwatch loading;
   std::vector<Map> maps;
   maps.reserve(options.maps.size());
   std::vector<const Map*> pointers;
   for (const std::string& path : options.maps) pointers.push_back(&maps.emplace_back(load_map(path)));
-  const auto loaded = Clock::now();
+  const double load_s = loading.seconds();
+  const Stopwatch joining;
   MergeOptions merging = options.merge;
   merging.max_weight = cap(
       options.max_weight, maps, [](const Map&) { return true; }, "max_weight", "cap of weights", "--max-weight",
@@ -101,18 +98,17 @@ int run(const Options& options) {
   const Map result = merge(pointers, merging);
   if (!writing) writing.emplace(options.out, options.overwrite);
   require_nothing_lost(options.out, result, LostTouches::refuse, options.overwrite);
-  const auto merged = Clock::now();
+  const double merge_s = joining.seconds();
+  const Stopwatch saving;
   const std::string hash = save_map(result, options.out);
-  const auto saved = Clock::now();
-  const nlohmann::json report = {
-      {"out", options.out},
-      {"maps", options.maps},
-      {"frames", frame_count(result.frames)},
-      {"blocks", result.store.size()},
-      {"active_voxels", active_voxel_count(result)},
-      {"map_hash", hash},
-      {"time_s",
-       {{"load", seconds(start, loaded)}, {"merge", seconds(loaded, merged)}, {"save", seconds(merged, saved)}}}};
+  const double save_s = saving.seconds();
+  const nlohmann::json report = {{"out", options.out},
+                                 {"maps", options.maps},
+                                 {"frames", frame_count(result.frames)},
+                                 {"blocks", result.store.size()},
+                                 {"active_voxels", active_voxel_count(result)},
+                                 {"map_hash", hash},
+                                 {"time_s", {{"load", load_s}, {"merge", merge_s}, {"save", save_s}}}};
   if (options.common.json)
     print_json(report);
   else if (!options.common.quiet)

@@ -7,10 +7,12 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <limits>
 #include <set>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/files/atomic_file.h"
 #include "io/map_file/map_file.h"
 #include "mapping/grids/leaf_mask.h"
@@ -27,10 +29,6 @@ size_t frames_missing_from(const FrameJournal& journal, const FusedFrames& run) 
     if (other.sequence == run.sequence && other.settings == run.settings)
       for (const int64_t frame : other.frames) missing.erase(frame);
   return missing.size();
-}
-
-BlockMask observed_voxels(const Block& block) {
-  return mask_where([weight = block.geometry->weight](int i) { return weight[i] > 0; });
 }
 
 /// Observed voxels of an older map that are not observed in the new one.
@@ -51,8 +49,8 @@ size_t touches_missing_from(const TouchJournal& journal, const TouchJournal& old
   }));
 }
 
-/// What the journals of an older map say that the new one does not hold, in words; empty where there is nothing.
-std::string missing_from(const Map& map, const MapJournals& older, LostTouches touches) {
+/// What an older map holds that the new one does not, in words; empty where there is nothing.
+std::string missing_from(const Map& map, const Map& older, LostTouches touches) {
   if (older.voxel_size_m != map.voxel_size_m) return "a map of " + std::to_string(older.voxel_size_m) + " m voxels";
   if (!older.classes.empty() && !(older.classes == map.classes)) return "a map of other classes";
   if (!continues(map.properties, older.properties)) return "a map of other properties";
@@ -61,9 +59,13 @@ std::string missing_from(const Map& map, const MapJournals& older, LostTouches t
   for (const FusedFrames& run : older.frames.runs) lost_frames += frames_missing_from(map.frames, run);
   const size_t lost_touches =
       touches == LostTouches::refuse ? touches_missing_from(map.touches, older.touches, true) : 0;
-  if (lost_frames == 0 && lost_touches == 0) return "";
-  return "a map with " + std::to_string(lost_frames) + " frames and " + std::to_string(lost_touches) +
-         " touches that the new one does not hold";
+  if (lost_frames > 0 || lost_touches > 0)
+    return "a map with " + std::to_string(lost_frames) + " frames and " + std::to_string(lost_touches) +
+           " touches that the new one does not hold";
+  // A part that was cut out has the whole journal of frames.
+  if (const size_t voxels = voxels_missing_from(map, older); voxels > 0)
+    return "a map with " + std::to_string(voxels) + " observed voxels that the new one does not hold";
+  return "";
 }
 
 }  // namespace
@@ -80,12 +82,12 @@ void prepare_output_folder(const fs::path& folder) {
 }
 
 void require_no_files(const fs::path& folder, const std::vector<std::string>& names, bool overwrite) {
-  std::string in_the_way;
-  for (const std::string& name : names)
-    if (fs::exists(folder / name)) in_the_way += (in_the_way.empty() ? "" : ", ") + name;
+  std::vector<std::string> in_the_way;
+  std::ranges::copy_if(names, std::back_inserter(in_the_way),
+                       [&](const auto& name) { return fs::exists(folder / name); });
   if (!in_the_way.empty() && !overwrite)
-    throw IoError(
-        describe_mismatch(folder.string(), "output exists", "no result there, or --force to replace it", in_the_way));
+    throw IoError(describe_mismatch(folder.string(), "output exists", "no result there, or --force to replace it",
+                                    listed(in_the_way)));
   for (const std::string& name : names) remove_abandoned_parts(folder / name);
 }
 
@@ -105,13 +107,9 @@ void require_nothing_lost(const fs::path& file, const Map& replacement, LostTouc
   std::string lost;
   size_t forgotten_touches = 0;
   try {
-    const MapJournals older = load_journals(file);
+    const Map older = load_map(file);
     lost = missing_from(replacement, older, touches);
     forgotten_touches = touches_missing_from(replacement.touches, older.touches, false);
-    // A part that was cut out has the whole journal of frames.
-    if (lost.empty())
-      if (const size_t voxels = voxels_missing_from(replacement, load_map(file)); voxels > 0)
-        lost = "a map with " + std::to_string(voxels) + " observed voxels that the new one does not hold";
   } catch (const Error&) {
     lost = "a file that is no map that can be read";
   }

@@ -10,13 +10,14 @@
 #include <string>
 #include <vector>
 
+#include "apps/belief_report.h"
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
 #include "apps/touch_options.h"
 #include "io/map_file/map_file.h"
-#include "io/readings/mask_image.h"
+#include "io/readings/points.h"
 
 namespace felt::apps {
 namespace {
@@ -155,7 +156,8 @@ void add_query(CLI::App& app) {
   where.add_option("--at", options->at, "World point, metres: x,y,z; may be repeated")
       ->check(check_point)
       ->allow_extra_args(false);
-  where.add_option("--file", options->file, "Points: one x,y,z a line");
+  where.add_option("--file", options->file,
+                   "Points (CSV): x,y,z a line, or a header line that names x, y and z among others");
   command.add_option("--properties", options->properties,
                      "Property table (YAML), instead of the one that the map may have");
   command.add_option("--below", options->below, "Probability that a property is at most this")->check(finite());

@@ -3,7 +3,8 @@
 #include <cmath>
 
 #include "apps/command.h"
-#include "core/error.h"
+#include "core/text.h"
+#include "io/sequence/open_sequence.h"
 #include "io/sequence/pose_list.h"
 
 namespace felt::apps {
@@ -18,7 +19,10 @@ void add_reading_options(CLI::App& command, ReadingArguments& a) {
   command.add_option("--depth-scale", a.depth_scale, "Stored depth units per metre")->group(reading);
   command.add_option("--depth-encoding", a.depth_encoding, "plain, or rotated3 (16 bits rotated left by 3)")
       ->group(reading);
-  add_switch(command, "--ray-length,!--no-ray-length", a.ray_length, "Depth is the length of the ray, not z")
+  CLI::Option* const along_ray =
+      add_switch(command, "--ray-length", a.ray_length, "Depth is the length of the ray, not z")->group(reading);
+  add_switch(command, "--no-ray-length", a.ray_length, "Depth is z, also where the sequence says otherwise", false)
+      ->excludes(along_ray)
       ->group(reading);
   command.add_option("--pose-convention", a.pose_convention, "c2w or w2c, opencv or opengl; for example w2c,opengl")
       ->group(reading);
@@ -45,33 +49,24 @@ void add_reading_options(CLI::App& command, ReadingArguments& a) {
   add_switch(command, "--no-color", a.no_color, "Do not read colour images")->group(reading);
 }
 
-SequenceOptions resolve(const ReadingArguments& a, SequenceOptions reading, std::vector<std::string>& problems) {
-  const auto attempt = [&](const std::string& text, auto step) {
-    if (text.empty()) return;
-    try {
-      step();
-    } catch (const ConfigError& problem) {
-      problems.emplace_back(problem.what());
-    }
+SequenceOptions resolve(const ReadingArguments& a, SequenceOptions reading, Problems& problems) {
+  const auto read = [&](const std::string& text, const auto& step) {
+    if (!text.empty()) problems.attempt_reading(step);
   };
-  if (!a.format.empty()) reading.format = a.format;
+  read(a.format, [&] {
+    require_layout(a.format);
+    reading.format = a.format;
+  });
   if (!a.labels.empty()) reading.labels_dir = a.labels;
   if (!a.probs.empty()) reading.probs_dir = a.probs;
   if (!a.classes.empty()) reading.classes_file = a.classes;
-  attempt(a.frames, [&] { reading.frames = parse_frame_selection(a.frames, "--frames"); });
-  attempt(a.intrinsics, [&] { reading.intrinsics = parse_intrinsics(a.intrinsics, "--intrinsics"); });
-  attempt(a.distortion, [&] { reading.distortion = parse_distortion(a.distortion, "--distortion"); });
-  attempt(a.body_camera, [&] {
-    try {
-      reading.T_body_camera = parse_pose(a.body_camera, "--body-camera");
-    } catch (const FormatError& fault) {
-      throw ConfigError(fault.what());
-    }
-  });
-  attempt(a.pose_convention,
-          [&] { reading.pose_convention = parse_pose_convention(a.pose_convention, "--pose-convention"); });
-  attempt(a.depth_encoding,
-          [&] { reading.depth_encoding = parse_depth_encoding(a.depth_encoding, "--depth-encoding"); });
+  read(a.frames, [&] { reading.frames = parse_frame_selection(a.frames, "--frames"); });
+  read(a.intrinsics, [&] { reading.intrinsics = parse_intrinsics(a.intrinsics, "--intrinsics"); });
+  read(a.distortion, [&] { reading.distortion = parse_distortion(a.distortion, "--distortion"); });
+  read(a.body_camera, [&] { reading.T_body_camera = parse_pose(a.body_camera, "--body-camera"); });
+  read(a.pose_convention,
+       [&] { reading.pose_convention = parse_pose_convention(a.pose_convention, "--pose-convention"); });
+  read(a.depth_encoding, [&] { reading.depth_encoding = parse_depth_encoding(a.depth_encoding, "--depth-encoding"); });
   if (a.depth_scale) reading.depth_scale = a.depth_scale;
   if (a.ray_length) reading.depth_is_ray_length = a.ray_length;
   if (a.max_dt_s) reading.max_dt_s = *a.max_dt_s;
@@ -79,22 +74,20 @@ SequenceOptions resolve(const ReadingArguments& a, SequenceOptions reading, std:
   if (a.label_offset) reading.label_offset = *a.label_offset;
   if (a.bgr) reading.bgr = *a.bgr;
   if (a.no_color) reading.read_color = !*a.no_color;
-  const auto expect = [&](bool good, const std::string& where, const std::string& what, double found) {
-    if (!good) problems.push_back(describe_mismatch(where, what, "a number above 0", std::to_string(found)));
+  const auto expect_above_zero = [&](double found, const std::string& where, const std::string& what) {
+    problems.expect(std::isfinite(found) && found > 0, where, what, "a number above 0", number_text(found));
   };
-  if (reading.depth_scale)
-    expect(std::isfinite(*reading.depth_scale) && *reading.depth_scale > 0, "--depth-scale", "depth units per metre",
-           *reading.depth_scale);
-  expect(std::isfinite(reading.max_dt_s) && reading.max_dt_s > 0, "--max-dt", "seconds", reading.max_dt_s);
-  if (!std::isfinite(reading.pose_stamp_offset))
-    problems.push_back(describe_mismatch("--stamp-offset", "offset", "a finite number", "another"));
+  if (reading.depth_scale) expect_above_zero(*reading.depth_scale, "--depth-scale", "depth units per metre");
+  expect_above_zero(reading.max_dt_s, "--max-dt", "seconds");
+  problems.expect(std::isfinite(reading.pose_stamp_offset), "--stamp-offset", "offset", "a finite number",
+                  number_text(reading.pose_stamp_offset));
   return reading;
 }
 
 SequenceOptions resolve(const ReadingArguments& arguments) {
-  std::vector<std::string> problems;
+  Problems problems;
   const SequenceOptions options = resolve(arguments, {}, problems);
-  if (!problems.empty()) throw ConfigError(problems);
+  problems.throw_if_any();
   return options;
 }
 

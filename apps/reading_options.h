@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <vector>
 
+#include "apps/problems.h"
 #include "io/sequence/sequence_options.h"
 
 namespace felt::apps {
@@ -27,9 +27,9 @@ void add_reading_options(CLI::App& command, ReadingArguments& arguments);
 
 /// Lays what was given over `base` (a configuration file's settings, or defaults). Adds to `problems` what cannot be
 /// used.
-SequenceOptions resolve(const ReadingArguments& arguments, SequenceOptions base, std::vector<std::string>& problems);
+SequenceOptions resolve(const ReadingArguments& arguments, SequenceOptions base, Problems& problems);
 
-/// The same without a base; throws ConfigError.
+/// The same without a base; throws as `Problems::throw_if_any` does.
 SequenceOptions resolve(const ReadingArguments& arguments);
 
 }  // namespace felt::apps

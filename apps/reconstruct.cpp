@@ -2,7 +2,6 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <functional>
@@ -24,6 +23,8 @@
 #include "apps/recorded_touches.h"
 #include "core/error.h"
 #include "core/simd.h"
+#include "core/stopwatch.h"
+#include "core/text.h"
 #include "io/doctor/doctor.h"
 #include "io/files/atomic_file.h"
 #include "io/files/json_text.h"
@@ -31,6 +32,7 @@
 #include "io/meshes/mesh_io.h"
 #include "io/sequence/decode_ahead.h"
 #include "io/sequence/open_sequence.h"
+#include "io/sequence/skip_reasons.h"
 #include "mapping/store/size_estimate.h"
 #include "mapping/surface/marching_cubes.h"
 #include "mapping/surface/surface_color.h"
@@ -40,18 +42,11 @@ namespace felt::apps {
 namespace {
 namespace fs = std::filesystem;
 
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
 constexpr const char* kMapName = "map.vdb";
 constexpr const char* kMeshName = "mesh.ply";
 constexpr const char* kReportName = "report.json";
 
-std::string gigabytes(double bytes) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g GB", bytes / 1e9);
-  return text;
-}
+std::string gigabytes(double bytes) { return number_text(bytes / 1e9, "%.3g GB"); }
 
 /// Refuses a map that cannot fit. Frames are decoded for this only where the worst case would not fit.
 void check_memory(const SequenceReader& sequence, const ReconstructOptions& options) {
@@ -73,12 +68,11 @@ void check_memory(const SequenceReader& sequence, const ReconstructOptions& opti
       surface.add(*frame, options.fusion.min_depth_m, options.fusion.max_depth_m);
   }
   if (bytes_of(surface.area_m2()) <= available) return;
-  char area[32];
-  std::snprintf(area, sizeof area, "%.3g m^2", surface.area_m2());
-  throw ConfigError(describe_mismatch("--voxel-size " + nlohmann::json(options.voxel_size_m).dump(),
-                                      "memory for the " + std::string(area) + " of surface in sampled frames",
-                                      "at most the " + gigabytes(available) + " available",
-                                      "an estimate of " + gigabytes(bytes_of(surface.area_m2()))));
+  throw ConfigError(describe_mismatch(
+      "--voxel-size " + nlohmann::json(options.voxel_size_m).dump(),
+      "memory for the " + number_text(surface.area_m2(), "%.3g m^2") + " of surface in sampled frames",
+      "at most the " + gigabytes(available) + " available",
+      "an estimate of " + gigabytes(bytes_of(surface.area_m2()))));
 }
 
 /// Working memory that must stay free to mesh and save what is fused.
@@ -128,13 +122,8 @@ void fuse(const SequenceReader& sequence, const FrameSource& source, const Perce
 
 /// "3 frames: 2 missing pose, 1 truncated depth image".
 std::string nothing_fused(const FusionRecord& record) {
-  std::string text = std::to_string(record.read) + " frames";
-  const char* separator = ": ";
-  for (const auto& [reason, count] : record.skipped) {
-    text += separator + std::to_string(count) + ' ' + reason;
-    separator = ", ";
-  }
-  return text;
+  const std::string frames = std::to_string(record.read) + " frames", reasons = skipped_text(record.skipped);
+  return reasons.empty() ? frames : frames + ": " + reasons;
 }
 
 /// Map file and mesh, made side by side. The map is what cannot be made again: a mesh that fails does not stop its
@@ -142,25 +131,25 @@ std::string nothing_fused(const FusionRecord& record) {
 void write_results(const Map& map, const std::function<std::string()>& save, const fs::path& folder, int threads,
                    ReconstructReport& report) {
   auto saving = std::async(threads > 1 ? std::launch::async : std::launch::deferred, [&] {
-    const auto start = Clock::now();
+    const Stopwatch watch;
     report.map_hash = save();
-    report.save_s = seconds_since(start);
+    report.save_s = watch.seconds();
   });
   if (threads <= 1) saving.wait();
   TriangleMesh mesh;
   std::exception_ptr mesh_failure;
   try {
-    const auto start = Clock::now();
+    const Stopwatch watch;
     std::vector<VertexEdge> edges;
     mesh = extract_mesh(map, {}, &edges);
     attach_beliefs(map, edges, mesh);
-    report.mesh_s = seconds_since(start);
+    report.mesh_s = watch.seconds();
   } catch (...) {
     mesh_failure = std::current_exception();
   }
   saving.get();
   if (mesh_failure) std::rethrow_exception(mesh_failure);
-  const auto start = Clock::now();
+  const Stopwatch watch;
   warn_if_coarse(mesh, folder / kMeshName);
   try {
     write_ply(folder / kMeshName, mesh);
@@ -169,7 +158,7 @@ void write_results(const Map& map, const std::function<std::string()>& save, con
   }
   report.mesh_vertices = mesh.positions.size();
   report.mesh_triangles = mesh.triangles.size();
-  report.mesh_s += seconds_since(start);
+  report.mesh_s += watch.seconds();
 }
 
 /// Blocks that the map file holds: not those that were made for a frame and then not observed.
@@ -179,19 +168,34 @@ size_t observed_blocks(const Map& map) {
       std::count_if(blocks.begin(), blocks.end(), [](const Block& block) { return block.geometry->observed(); }));
 }
 
+/// What the map holds, and what it took by now.
+void describe(const Map& map, const ReconstructOptions& options, ReconstructReport& report) {
+  report.voxel_size_m = options.voxel_size_m, report.truncation_m = options.truncation_m;
+  report.blocks = observed_blocks(map);
+  report.active_voxels = active_voxel_count(map);
+  report.tsdf_bytes = map.store.geometry_bytes(), report.color_bytes = map.store.color_bytes();
+  report.property_bytes = touch_plane_bytes(map) + journal_bytes(map.touches);
+  report.classes = map.classes.size();
+  report.class_bytes = class_bytes(map);
+  report.instance_bytes = map.store.instance_bytes();
+  report.simd = simd_name();
+  report.peak_rss_bytes = peak_resident_bytes();
+}
+
 /// What a run left out although it was asked for.
-void warn_of_losses(const FusionRecord& fusion, const IntegrationConfig& config, const Map& map) {
+void warn_of_losses(const ReconstructReport& report, const ReconstructOptions& options, const Map& map) {
+  const FusionRecord& fusion = report.fusion;
+  const IntegrationConfig& config = options.fusion;
+  if (report.mesh_triangles == 0)
+    spdlog::warn("the map holds no surface: is there depth between {} and {} m, and are voxels of {} m small enough?",
+                 config.min_depth_m, config.max_depth_m, options.voxel_size_m);
   if (!fusion.unknown_ids.empty()) {
     constexpr size_t kNamed = 8;
-    std::string ids;
     uint64_t pixels = 0;
-    size_t named = 0;
-    for (const auto& [id, count] : fusion.unknown_ids) {
-      pixels += count;
-      if (++named <= kNamed) ids.append(ids.empty() ? "" : ", ").append(std::to_string(id));
-    }
-    if (named > kNamed) ids += " and " + std::to_string(named - kNamed) + " more";
-    spdlog::warn("labels that the class table does not know, not fused: {} ({} pixels){}", ids, pixels,
+    for (const auto& [id, count] : fusion.unknown_ids) pixels += count;
+    const auto id_of = [](const auto& counted) { return std::to_string(counted.first); };
+    spdlog::warn("labels that the class table does not know, not fused: {} ({} pixels){}",
+                 listed(fusion.unknown_ids, id_of, kNamed), pixels,
                  fusion.labels.voxels == 0 ? "; no voxel has a label: is it the table of these images?" : "");
   }
   const bool any_instance = std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
@@ -200,7 +204,7 @@ void warn_of_losses(const FusionRecord& fusion, const IntegrationConfig& config,
     spdlog::warn("--instances: expected frames with instance images, found none");
 }
 
-void print_summary(const ReconstructReport& report, const fs::path& folder) {
+void print_summary(const ReconstructReport& report, const std::vector<TouchOutcome>& touched, const fs::path& folder) {
   const FusionRecord& fusion = report.fusion;
   std::printf("%lld of %lld frames fused in %.2f s: %zu blocks, %zu voxels; mesh of %zu triangles\n",
               static_cast<long long>(fusion.fused), static_cast<long long>(fusion.read), report.total_s, report.blocks,
@@ -218,6 +222,9 @@ void print_summary(const ReconstructReport& report, const fs::path& folder) {
     std::printf("  %llu observations of probabilities that are no distribution, not fused\n",
                 static_cast<unsigned long long>(fusion.labels.invalid));
   for (const char* name : {kMapName, kMeshName, kReportName}) std::printf("  %s\n", (folder / name).c_str());
+  const auto applied = std::count_if(touched.begin(), touched.end(),
+                                     [](const TouchOutcome& outcome) { return outcome.effect.has_value(); });
+  if (applied > 0) std::printf("  %td touches recorded with the sequence\n", applied);
 }
 
 /// A few frames projected into each other before the work begins: what is likely wrong. Findings that call for a
@@ -245,7 +252,7 @@ void require_tables_of(const Map& map, const ClassTable& classes, const Property
 }
 
 int run(const ReconstructArguments& arguments, CommonOptions common) {
-  const auto start = Clock::now();
+  const Stopwatch watch;
   const InterruptGuard interrupt;  // from the start: a signal while the sequence opens counts too
   ReconstructOptions options = resolve(arguments, common.threads);
   common.threads = options.threads;
@@ -314,9 +321,9 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   // An interrupted run may go on: its touches come with its last frame.
   std::vector<TouchOutcome> touched;
   if (report.fusion.stopped.empty() && !complete) {
-    const auto start_touch = Clock::now();
+    const Stopwatch touching;
     touched = apply_touches(map, touches);
-    report.touch_s = seconds_since(start_touch);
+    report.touch_s = touching.seconds();
     complete = true;
     if (!touches.file.empty()) touches_done = json_text(touches_json(touches, touched));
   }
@@ -330,18 +337,9 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
     }
   };
   write_results(map, save_at_the_end, options.out, common.thread_count(), report);
-  report.voxel_size_m = options.voxel_size_m, report.truncation_m = options.truncation_m;
-  report.blocks = observed_blocks(map);
-  report.active_voxels = active_voxel_count(map);
-  report.tsdf_bytes = map.store.geometry_bytes(), report.color_bytes = map.store.color_bytes();
-  report.property_bytes = touch_plane_bytes(map) + journal_bytes(map.touches);
-  report.classes = map.classes.size();
-  report.class_bytes = class_bytes(map);
-  report.instance_bytes = map.store.instance_bytes();
+  describe(map, options, report);
   report.threads = common.thread_count();
-  report.simd = simd_name();
-  report.peak_rss_bytes = peak_resident_bytes();
-  report.total_s = seconds_since(start);
+  report.total_s = watch.seconds();
   nlohmann::ordered_json document = to_json(report, config);
   if (!touches.file.empty())
     document["touches"] =
@@ -349,18 +347,11 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   const std::string json = json_text(document, 2) + "\n";
   write_file_atomically(options.out / kReportName, json);
 
-  if (report.mesh_triangles == 0)
-    spdlog::warn("the map holds no surface: is there depth between {} and {} m, and are voxels of {} m small enough?",
-                 options.fusion.min_depth_m, options.fusion.max_depth_m, options.voxel_size_m);
-  warn_of_losses(report.fusion, options.fusion, map);
-  if (common.json) {
+  warn_of_losses(report, options, map);
+  if (common.json)
     std::fputs(json.c_str(), stdout);
-  } else if (!common.quiet) {
-    print_summary(report, options.out);
-    const auto applied = std::count_if(touched.begin(), touched.end(),
-                                       [](const TouchOutcome& outcome) { return outcome.effect.has_value(); });
-    if (applied > 0) std::printf("  %td touches recorded with the sequence\n", applied);
-  }
+  else if (!common.quiet)
+    print_summary(report, touched, options.out);
   print_left_out(touches, touched);
   if (!touches.file.empty() && report.resumed_after > 0 && touched.empty() && touches_done.empty())
     spdlog::warn("{}: not applied, as the map was complete before: feltmap touch MAP --file does it",

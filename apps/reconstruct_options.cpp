@@ -1,54 +1,17 @@
 #include "apps/reconstruct_options.h"
 
 #include <cmath>
-#include <functional>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "apps/command.h"
 #include "apps/label_options.h"
 #include "apps/number_checks.h"
 #include "core/error.h"
+#include "core/text.h"
 #include "io/settings/reconstruct_config.h"
 
 namespace felt::apps {
 namespace {
-
-const std::map<std::string, DistanceModel> kDistances = {{"optical-axis", DistanceModel::optical_axis},
-                                                         {"ray", DistanceModel::ray},
-                                                         {"tangent-plane", DistanceModel::tangent_plane}};
-const std::map<std::string, WeightModel> kWeights = {{"constant", WeightModel::constant},
-                                                     {"inverse-square", WeightModel::inverse_square},
-                                                     {"sensor-noise", WeightModel::sensor_noise}};
-
-std::string text_of(double number) {
-  std::ostringstream text;
-  text << number;
-  return text.str();
-}
-
-/// Runs checks one after the other and keeps what they found.
-class Problems {
-public:
-  void attempt(const std::function<void()>& step) {
-    try {
-      step();
-    } catch (const ConfigError& e) {
-      messages_.emplace_back(e.what());
-    }
-  }
-  void expect(bool good, const std::string& where, const std::string& what, const std::string& expected,
-              const std::string& found) {
-    if (!good) messages_.push_back(describe_mismatch(where, what, expected, found));
-  }
-  void add(const std::string& message) { messages_.push_back(message); }
-  void throw_if_any() const {
-    if (!messages_.empty()) throw ConfigError(messages_);
-  }
-
-private:
-  std::vector<std::string> messages_;
-};
 
 bool positive(double value) { return std::isfinite(value) && value > 0; }
 
@@ -58,11 +21,12 @@ void require_bands_that_fit(const ReconstructOptions& options) {
   if (!positive(voxel_m)) return;
   if (!(truncation_m >= voxel_m))
     throw ConfigError(describe_mismatch("--truncation", "band around the surface",
-                                        "at least one voxel, " + text_of(voxel_m) + " m",
-                                        text_of(truncation_m) + " m"));
+                                        "at least one voxel, " + number_text(voxel_m) + " m",
+                                        number_text(truncation_m) + " m"));
   if (const auto& band = options.labels.band_vox; band && *band * voxel_m > truncation_m * (1 + 1e-6))
     throw ConfigError(describe_mismatch("--label-band", "voxels",
-                                        "at most the truncation, " + text_of(truncation_m / voxel_m), text_of(*band)));
+                                        "at most the truncation, " + number_text(truncation_m / voxel_m),
+                                        number_text(*band)));
 }
 
 }  // namespace
@@ -92,14 +56,15 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
   command.add_option("--min-depth", a.min_depth_m, "Nearer depth is not used, metres [0.1]")->group(map);
   command.add_option("--max-depth", a.max_depth_m, "Farther depth is not used, metres [4]")->group(map);
   const IntegrationConfig standard;
-  add_choice(command, "--distance", a.distance, kDistances,
-             "What signed distance is measured along [" + name_of(kDistances, standard.distance) + "]")
+  add_choice(command, "--distance", a.distance, kDistanceNames,
+             "What signed distance is measured along [" + name_of(kDistanceNames, standard.distance) + "]")
       ->group(map);
-  add_choice(command, "--weight", a.weight, kWeights,
-             "Weight of a measurement [" + name_of(kWeights, standard.weight) + "]")
+  add_choice(command, "--weight", a.weight, kWeightNames,
+             "Weight of a measurement [" + name_of(kWeightNames, standard.weight) + "]")
       ->group(map);
   command
-      .add_option("--max-weight", a.max_weight, "Cap of a voxel's summed weight [" + text_of(standard.max_weight) + "]")
+      .add_option("--max-weight", a.max_weight,
+                  "Cap of a voxel's summed weight [" + number_text(standard.max_weight) + "]")
       ->group(map);
   add_switch(command, "--carve", a.carve, "Let free space seen later erase what stood there")->group(map);
 
@@ -139,11 +104,7 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   configured.bgr = file.bgr.value_or(false);
   configured.max_dt_s = file.max_dt_s.value_or(configured.max_dt_s);
   configured.read_color = file.color.value_or(true);
-  problems.attempt([&] {
-    std::vector<std::string> found;
-    options.reading = apps::resolve(a.reading, configured, found);
-    if (!found.empty()) throw ConfigError(found);
-  });
+  options.reading = apps::resolve(a.reading, configured, problems);
 
   SequenceOptions& reading = options.reading;
   options.perception = a.perception;
@@ -155,12 +116,12 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   options.max_depth_given = a.max_depth_m || file.max_depth_m;
   options.voxel_size_m = a.voxel_size_m.value_or(file.voxel_size_m.value_or(options.voxel_size_m));
   problems.expect(positive(options.voxel_size_m), "--voxel-size", "edge of a voxel in metres", "a number above 0",
-                  text_of(options.voxel_size_m));
-  problems.attempt([&] {
-    options.truncation = a.truncation.empty() ? file.truncation.value_or("4vox") : a.truncation;
-    options.truncation_m = parse_truncation(options.truncation, options.voxel_size_m, "--truncation");
-    require_bands_that_fit(options);
-  });
+                  number_text(options.voxel_size_m));
+  // Of a file it was read before.
+  options.truncation = a.truncation.empty() ? file.truncation.value_or("4vox") : a.truncation;
+  if (problems.attempt_reading(
+          [&] { options.truncation_m = parse_truncation(options.truncation, options.voxel_size_m, "--truncation"); }))
+    problems.attempt([&] { require_bands_that_fit(options); });
 
   IntegrationConfig& fusion = options.fusion;
   const auto choose = [](float& value, const std::optional<double>& line, const std::optional<double>& from_file) {
@@ -175,18 +136,19 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   fusion.weight = a.weight.value_or(file.weight.value_or(fusion.weight));
   fusion.carve = a.carve.value_or(file.carve.value_or(fusion.carve));
   problems.expect(std::isfinite(fusion.min_depth_m) && fusion.min_depth_m >= 0, "--min-depth", "metres",
-                  "a number of at least 0", text_of(fusion.min_depth_m));
+                  "a number of at least 0", number_text(fusion.min_depth_m));
   problems.expect(std::isfinite(fusion.max_depth_m) && fusion.max_depth_m > fusion.min_depth_m, "--max-depth", "metres",
-                  "a number above the smallest depth, " + text_of(fusion.min_depth_m), text_of(fusion.max_depth_m));
+                  "a number above the smallest depth, " + number_text(fusion.min_depth_m),
+                  number_text(fusion.max_depth_m));
   problems.expect(fusion.max_weight >= 1, "--max-weight", "summed weight", "a number of at least 1",
-                  text_of(fusion.max_weight));
+                  number_text(fusion.max_weight));
   options.labels = overlaid(a.label_settings, file.label_settings);
   for (const std::string& problem : problems_of(options.labels)) problems.add(problem);
   fusion.labels = label_config(options.labels);
-  problems.expect(fusion.labels.max_evidence == 0 || fusion.labels.evidence <= fusion.labels.max_evidence,
+  problems.expect(!(fusion.labels.max_evidence > 0) || fusion.labels.evidence <= fusion.labels.max_evidence,
                   "--label-cap", "evidence of a voxel",
-                  "at least that of one observation, " + text_of(fusion.labels.evidence),
-                  text_of(fusion.labels.max_evidence));
+                  "at least that of one observation, " + number_text(fusion.labels.evidence),
+                  number_text(fusion.labels.max_evidence));
   reading.read_instances = fusion.labels.instances || a.perception.vote == SegmentSource::instances;
   problems.expect(a.perception.instances.empty() || reading.read_instances, "--masks", "what they are for",
                   "--vote instances or --instances", "neither");
@@ -217,8 +179,7 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   }
   if (reading.depth_scale) json["depth_scale"] = *reading.depth_scale;
   if (reading.pose_convention) json["pose_convention"] = to_string(*reading.pose_convention);
-  if (reading.depth_encoding)
-    json["depth_encoding"] = *reading.depth_encoding == DepthEncoding::rotated3 ? "rotated3" : "plain";
+  if (reading.depth_encoding) json["depth_encoding"] = to_string(*reading.depth_encoding);
   if (reading.distortion) {
     const Distortion& d = *reading.distortion;
     json["distortion"] = {d.k1, d.k2, d.p1, d.p2, d.k3};
@@ -244,8 +205,8 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   json["truncation_m"] = options.truncation_m;
   json["min_depth_m"] = short_decimal(fusion.min_depth_m);
   json["max_depth_m"] = short_decimal(fusion.max_depth_m);
-  json["distance"] = name_of(kDistances, fusion.distance);
-  json["weight"] = name_of(kWeights, fusion.weight);
+  json["distance"] = name_of(kDistanceNames, fusion.distance);
+  json["weight"] = name_of(kWeightNames, fusion.weight);
   json["max_weight"] = short_decimal(fusion.max_weight);
   json["dropoff_start_vox"] = short_decimal(fusion.dropoff_start_vox);
   json["color_band_vox"] = short_decimal(fusion.color_band_vox);

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "apps/belief_report.h"
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
@@ -28,8 +29,7 @@ int run_region(const RegionCommandOptions& options) {
   const RegionSettings settings = options.region.resolved(map);
   use_properties(map, options.properties);
   const Contact contact = find_contact(map, point_of(options.at), settings);
-  const std::optional<ViewMask> view = options.region.view();
-  const Region region = view ? find_region(map, *view, settings, &contact) : find_region(map, contact, settings);
+  const Region region = options.region.region_at(map, contact, settings);
   const RegionSummary summary = summarize(map, region, settings);
   const Belief belief = Beliefs(map).of(region, covering_touches(map, region));
   if (!options.mesh.empty()) write_mesh(options.mesh, region_mesh(map, region));

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -12,6 +14,8 @@
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
 #include "apps/output_files.h"
+#include "apps/problems.h"
+#include "apps/reading_options.h"
 #include "apps/touch_options.h"
 #include "core/error.h"
 #include "io/map_file/map_file.h"
@@ -29,10 +33,10 @@ namespace fs = std::filesystem;
 struct RenderCommand {
   CommonOptions common;
   CameraOptions camera;
-  std::string map, out, trajectory, overview, properties, up = "0,0,1";
+  std::string map, out, trajectory, format, frames, overview, properties, up = "0,0,1";
   std::vector<std::string> poses;
   std::vector<std::string> images = {"depth", "normal", "color"}, more_images;
-  CLI::Option* images_option = nullptr;
+  CLI::Option *images_option = nullptr, *intrinsics = nullptr, *size = nullptr;
   bool colored = false;
   ViewOptions options;
 };
@@ -94,7 +98,7 @@ bool names_images(const std::string& word) {
 /// Everything that the images of a view are made from.
 struct Source {
   const Map& map;
-  const std::vector<TouchView>& touched;
+  const std::map<std::string, PropertyImage>& properties;  ///< that are asked for, by the name of their image
   RayCaster caster;
   VoxelBeliefs beliefs;
 };
@@ -129,31 +133,56 @@ nlohmann::ordered_json write_view(const RenderCommand& command, const Source& so
         write_png(path_of(".color.png"),
                   felt::colored(entropy, 0, std::log(double(std::max(2, source.map.classes.size())))));
     }
-    if (const auto property = property_image_of(source.map, source.touched, image)) {
-      const PropertyImages values = property_images(source.beliefs, view.voxel, property->property);
-      write_values(property->sd ? values.sd : values.mean, property->low, property->high);
+    if (const auto asked = source.properties.find(image); asked != source.properties.end()) {
+      const PropertyImage& property = asked->second;
+      const PropertyImages values = property_images(source.beliefs, view.voxel, property.property);
+      write_values(property.sd ? values.sd : values.mean, property.low, property.high);
     }
   }
   return names;
+}
+
+/// The camera and the poses, those of --pose first.
+Viewpoints viewpoints_of(const RenderCommand& command) {
+  const bool of_sequence = fs::is_directory(command.trajectory);
+  Problems problems;
+  for (const auto& [name, given] :
+       {std::pair{"--format", !command.format.empty()}, {"--frames", !command.frames.empty()}})
+    if (given && !of_sequence)
+      problems.add_of_usage(describe_mismatch("render", name, "--trajectory SEQUENCE, which it is for", "none"));
+  if (of_sequence && command.size->count() > 0)
+    problems.add_of_usage(
+        describe_mismatch("render", "--size", "that of the images of --trajectory SEQUENCE", "another"));
+  Viewpoints views;
+  for (const std::string& pose : command.poses)
+    problems.attempt_reading([&] { views.T_world_camera.push_back(parse_pose(pose, "--pose")); });
+  problems.throw_if_any();
+  if (command.trajectory.empty()) {
+    views.camera = camera_of(command.camera);
+    return views;
+  }
+  ReadingArguments reading;
+  reading.format = command.format, reading.frames = command.frames;
+  if (command.intrinsics->count() > 0) reading.intrinsics = command.camera.intrinsics;
+  SequenceOptions options = resolve(reading);
+  options.read_color = options.read_instances = false;
+  const Viewpoints recorded = read_viewpoints(command.trajectory, command.camera, options);
+  views.camera = recorded.camera;
+  views.T_world_camera.insert(views.T_world_camera.end(), recorded.T_world_camera.begin(),
+                              recorded.T_world_camera.end());
+  return views;
 }
 
 int render(const RenderCommand& command) {
   const bool views = !command.poses.empty() || !command.trajectory.empty();
   if (!views && command.overview.empty()) throw CLI::RequiredError("--pose, --trajectory or --overview");
   if (views && command.out.empty()) throw CLI::RequiredError("--out");
-  std::vector<Eigen::Isometry3d> poses;
-  try {
-    for (const std::string& pose : command.poses) poses.push_back(parse_pose(pose, "--pose"));
-  } catch (const FormatError& fault) {
-    throw CLI::ValidationError(fault.what());
-  }
-  const PinholeCamera camera = camera_of(command.camera);
+  const auto [camera, poses] = viewpoints_of(command);
   std::vector<std::string> problems;
-  if (!command.trajectory.empty())
-    for (const auto& T : read_poses(command.trajectory)) poses.push_back(T);
   Map map = load_map(command.map);
   use_properties(map, command.properties);
   const std::vector<TouchView> touched = touch_views(map);
+  std::map<std::string, PropertyImage> properties;
   nlohmann::ordered_json levels = nlohmann::ordered_json::object();
   bool any_to_color = false;
   for (const std::string& image : command.images) {
@@ -162,7 +191,10 @@ int render(const RenderCommand& command) {
     if (of_classes && map.classes.empty())
       problems.push_back(describe_mismatch(command.map, "--images class, entropy", "a map with classes", "none"));
     any_to_color |= of_classes || property;
-    if (property) levels[image] = {{"1", property->low}, {"65535", property->high}};
+    if (property) {
+      properties.emplace(image, *property);
+      levels[image] = {{"1", property->low}, {"65535", property->high}};
+    }
     if (!property && std::find(kImages.begin(), kImages.end(), image) == kImages.end()) {
       std::string known = "depth, normal, color, class, entropy";
       for (const Property& p : map.properties.properties()) known += ", " + p.name + ".mean, " + p.name + ".sd";
@@ -184,7 +216,7 @@ int render(const RenderCommand& command) {
   }
   if (!poses.empty()) {
     fs::create_directories(command.out);
-    const Source source{map, touched, RayCaster(map), VoxelBeliefs(map)};
+    const Source source{map, properties, RayCaster(map), VoxelBeliefs(map)};
     int64_t too_far = 0;
     for (size_t i = 0; i < poses.size(); ++i)
       json["views"].push_back(
@@ -210,7 +242,7 @@ void add_render(CLI::App& app) {
   CLI::App& sub = add_command(
       app,
       {"render", "Depth, normal, colour, class, entropy and property images of a map from any pose, ray-cast",
-       "feltmap render out/map.vdb --trajectory poses.txt --out views\n"
+       "feltmap render out/map.vdb --trajectory recording --frames 0::10 --out views\n"
        "feltmap render out/map.vdb --pose 0,0,1.5,0.5,-0.5,0.5,-0.5 --images depth,color --out views\n"
        "feltmap render out/map.vdb --trajectory poses.txt --images class,friction.mean --colored --out views\n"
        "feltmap render out/map.vdb --overview picture.png --up 0,0,1"},
@@ -228,7 +260,12 @@ void add_render(CLI::App& app) {
   sub.add_option("--pose", command.poses,
                  "Camera-to-world pose: tx,ty,tz,qx,qy,qz,qw or 12 or 16 numbers of a matrix (repeatable)")
       ->allow_extra_args(false);
-  sub.add_option("--trajectory", command.trajectory, "Text file with one such pose a line, a stamp before it or not");
+  sub.add_option(
+      "--trajectory", command.trajectory,
+      "Text file with one such pose a line, a stamp before it or not; or a recorded sequence, seen again with "
+      "its own camera");
+  sub.add_option("--format", command.format, "Layout of the sequence (else detected)");
+  sub.add_option("--frames", command.frames, "Frames a:b:step of the sequence");
   sub.add_option("--out", command.out,
                  "Folder for the images: <number>.<image>.png; depth in millimetres, entropy in "
                  "thousandths of a nat, classes as ids, properties from 1 to 65535 between the ends that --json "
@@ -245,6 +282,8 @@ void add_render(CLI::App& app) {
                "Also write class, entropy and property images in colour, to look at: <number>.<image>.color.png");
   sub.add_option("--properties", command.properties, "Property table (YAML), instead of the one that the map may have");
   add_camera_options(sub, command.camera);
+  command.intrinsics = sub.get_option("--intrinsics");
+  command.size = sub.get_option("--size");
   sub.add_option("--max-depth", command.options.max_depth_m, "Metres along the optical axis")
       ->check(above_zero())
       ->capture_default_str();

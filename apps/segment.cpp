@@ -1,4 +1,3 @@
-#include <chrono>
 #include <cstdio>
 #include <map>
 #include <memory>
@@ -11,7 +10,9 @@
 #include "apps/output_files.h"
 #include "apps/perception_options.h"
 #include "apps/progress.h"
+#include "apps/reading_options.h"
 #include "core/error.h"
+#include "core/stopwatch.h"
 #include "io/files/atomic_file.h"
 #include "io/files/json_text.h"
 #include "io/files/text_input.h"
@@ -24,7 +25,6 @@ namespace felt::apps {
 namespace {
 namespace fs = std::filesystem;
 using json = nlohmann::ordered_json;
-using Clock = std::chrono::steady_clock;
 
 constexpr const char* kStateName = "segment.json";
 constexpr const char* kClassesName = "classes.yaml";
@@ -102,11 +102,11 @@ SegmentRecord segment_frames(const SequenceReader& sequence, const Perception& p
     } else if (const Frame& frame = std::get<Frame>(*next); frame.labels.empty() && frame.probabilities.empty()) {
       ++record.skipped["no labels"];
     } else {
-      const auto start = Clock::now();
+      const Stopwatch watch;
       write_file_atomically(names.of(frame.index), names.probabilities
                                                        ? encode_probabilities(frame.probabilities)
                                                        : encode_labels(frame.labels, sequence.info().classes));
-      record.write_s += std::chrono::duration<double>(Clock::now() - start).count();
+      record.write_s += watch.seconds();
       ++record.written;
     }
     record.network_s = perception.times->network_s();
@@ -123,19 +123,19 @@ SegmentRecord segment_frames(const SequenceReader& sequence, const Perception& p
 }
 
 int run_segment(const SegmentOptions& options) {
-  const auto start = Clock::now();
+  const Stopwatch watch;
   if (!options.perception.asked())
-    throw ConfigError(describe_mismatch("segment", "--net or --vote", "what makes or changes labels", "neither"));
+    throw CLI::ValidationError(
+        describe_mismatch("segment", "--net or --vote", "what makes or changes labels", "neither"));
   if (!options.perception.instances.empty() && options.perception.vote != SegmentSource::instances)
-    throw ConfigError(describe_mismatch("segment", "--masks", "--vote instances, which they are for", "without it"));
-  SequenceOptions reading;
-  reading.format = options.format;
-  reading.classes_file = options.classes;
-  reading.labels_dir = options.labels;
-  reading.probs_dir = options.probs;
+    throw CLI::ValidationError(
+        describe_mismatch("segment", "--masks", "--vote instances, which they are for", "without it"));
+  ReadingArguments arguments;
+  arguments.format = options.format, arguments.frames = options.frames;
+  arguments.labels = options.labels, arguments.probs = options.probs, arguments.classes = options.classes;
+  SequenceOptions reading = resolve(arguments);
   reading.instances_dir = options.perception.instances;
   reading.read_instances = options.perception.vote == SegmentSource::instances;
-  if (!options.frames.empty()) reading.frames = parse_frame_selection(options.frames, "--frames");
   auto sequence = open_sequence(options.sequence, reading);
   Perception perception = perception_of(options.perception, sequence->info().classes);
   // Recorded probabilities stay probabilities.
@@ -145,7 +145,7 @@ int run_segment(const SegmentOptions& options) {
   sequence = perceived_sequence(std::move(sequence), perception);
   prepare(options, names, sequence->info().classes);
   SegmentRecord record = segment_frames(*sequence, perception, names, options);
-  record.total_s = std::chrono::duration<double>(Clock::now() - start).count();
+  record.total_s = watch.seconds();
 
   const std::string kind = names.probabilities ? "probs" : "labels";
   if (options.json) {

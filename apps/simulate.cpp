@@ -1,3 +1,6 @@
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -11,7 +14,9 @@
 #include "apps/number_checks.h"
 #include "apps/progress.h"
 #include "core/error.h"
+#include "core/text.h"
 #include "io/simulation/scene_file.h"
+#include "io/simulation/scene_library.h"
 #include "io/simulation/sequence_writer.h"
 #include "io/tables/confusion_file.h"
 #include "io/tables/property_yaml.h"
@@ -93,13 +98,14 @@ SimulationSettings settings_of(const SimulateOptions& o) {
     network.class_share = class_shares(s.scene, s.trajectory, s.camera, s.label_set);
     s.network = std::move(network);
   } else if (o.top > 0) {
-    throw ConfigError(describe_mismatch("simulate", "--top", "a --network that gives probabilities", "--network none"));
+    throw CLI::ValidationError(
+        describe_mismatch("simulate", "--top", "a --network that gives probabilities", "--network none"));
   }
   if (!o.properties.empty()) s.properties = read_properties(o.properties);
   s.touches = {o.touches, o.touch_sigma, o.seed};
   if (o.touch_where == "mistaken") {
     if (!s.network || s.label_set != LabelSet::material)
-      throw ConfigError(
+      throw CLI::ValidationError(
           describe_mismatch("simulate", "--touch-where mistaken", "--labels material and a --network", "none"));
     s.touches.mistaken_by = s.network;
   }
@@ -110,14 +116,34 @@ SimulationSettings settings_of(const SimulateOptions& o) {
   // A camera inside a solid sees nothing that makes sense.
   if (const double clear_m = clearance_m(s.scene, s.trajectory); clear_m <= 0.01)
     throw ConfigError(describe_mismatch("simulate", "trajectory", "a camera more than 1 cm from every surface",
-                                        "one at " + std::to_string(clear_m) + " m (choose another --trajectory)"));
+                                        "one at " + number_text(clear_m, "%.3g") + " m (choose another --trajectory)"));
   return s;
+}
+
+/// Touches that a reconstruction of the sequence cannot use as it is, or that cannot be made.
+void warn_of_touches(const SimulationSettings& s) {
+  if (s.touches.count == 0 || s.properties.empty()) return;
+  const Property& property = s.properties[0];
+  if (std::none_of(s.scene.primitives.begin(), s.scene.primitives.end(), [&](const Primitive& solid) {
+        const uint16_t slot = s.scene.materials.slot_of_id(solid.material);
+        return slot != ClassTable::kNoSlot && property.priors.contains(s.scene.materials.at_slot(slot).name);
+      }))
+    spdlog::warn(
+        "--touches: nothing is touched, as no material of the scene has a prior of {}: they need --properties "
+        "with one",
+        property.name);
+  else if (s.label_set == LabelSet::semantic)
+    spdlog::warn(
+        "--touches: labels are of things and priors of {} of materials: to use the touches, reconstruct needs "
+        "--properties with priors of these things (or simulate --labels material)",
+        property.name);
 }
 
 int run_simulate(const SimulateOptions& o) {
   if (o.list) return list_scenes(o);
   if (o.scene.empty() || o.out.empty()) throw CLI::RequiredError(o.scene.empty() ? "SCENE" : "--out");
   const SimulationSettings settings = settings_of(o);
+  warn_of_touches(settings);
   const InterruptGuard interrupt;
   bool whole = false;
   {

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/belief_report.h"
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"

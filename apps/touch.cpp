@@ -9,11 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "apps/belief_report.h"
 #include "apps/command.h"
 #include "apps/commands.h"
 #include "apps/exit_code.h"
 #include "apps/number_checks.h"
 #include "apps/output_files.h"
+#include "apps/problems.h"
 #include "apps/touch_options.h"
 #include "core/text.h"
 #include "inference/decision.h"
@@ -209,7 +211,7 @@ int run_touch(const TouchOptions& options) {
   std::vector<TouchEffect> effects;
   if (!options.undo.empty() || !options.redo.empty()) {
     const bool undo = !options.undo.empty();
-    const uint64_t id = id_of_text(undo ? options.undo : options.redo);
+    const uint64_t id = of_command_line([&] { return id_of_text(undo ? options.undo : options.redo); });
     undo ? undo_touch(map, id) : redo_touch(map, id);
     out[undo ? "undone" : "redone"] = id_text(id);
     said = "touch " + id_text(id) +

@@ -1,6 +1,9 @@
 #include "core/text.h"
 
+#include <algorithm>
 #include <cstdio>
+#include <numeric>
+#include <utility>
 
 namespace felt {
 
@@ -8,6 +11,26 @@ std::string number_text(double value, const char* format) {
   std::string text(size_t(snprintf(nullptr, 0, format, value)), '\0');
   snprintf(text.data(), text.size() + 1, format, value);
   return text;
+}
+
+std::string nearest_word(const std::string& word, const std::vector<std::string>& known) {
+  // Levenshtein 1966, one row of the table at a time.
+  const auto distance = [](const std::string& a, const std::string& b) {
+    std::vector<size_t> row(b.size() + 1);
+    std::iota(row.begin(), row.end(), size_t(0));
+    for (size_t i = 1; i <= a.size(); ++i) {
+      size_t diagonal = std::exchange(row[0], i);
+      for (size_t j = 1; j <= b.size(); ++j)
+        diagonal = std::exchange(row[j], std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1])}));
+    }
+    return row.back();
+  };
+  std::string best;
+  size_t least = std::max<size_t>(2, word.size() / 2) + 1;
+  if (word.size() > 64) return best;
+  for (const std::string& candidate : known)
+    if (const size_t d = distance(word, candidate); d < least) least = d, best = candidate;
+  return best;
 }
 
 }  // namespace felt

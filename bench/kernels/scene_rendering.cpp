@@ -3,6 +3,7 @@
 #include <tbb/global_control.h>
 
 #include "io/simulation/render_sequence.h"
+#include "io/simulation/scene_library.h"
 
 namespace {
 

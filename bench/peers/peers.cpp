@@ -13,6 +13,7 @@
 #include "core/simd.h"
 #include "io/meshes/mesh_io.h"
 #include "io/simulation/render_sequence.h"
+#include "io/simulation/scene_library.h"
 #include "mapping/evaluation/mesh_distance.h"
 
 namespace {

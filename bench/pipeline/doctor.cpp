@@ -1,12 +1,12 @@
 // Faults put into recordings one at a time, and what the doctor says of each: a table of hits. `bench_doctor [NAME...]`
 // takes recordings below FELTMAP_DATA; exits 1 where a sound sequence is accused or less than 95 % of faults are named.
-#include <chrono>
 #include <cstdio>
 #include <map>
 #include <random>
 
 #include "bench/support/bench.h"
 #include "bench/support/corrupt.h"
+#include "core/stopwatch.h"
 #include "io/doctor/doctor.h"
 
 namespace fs = std::filesystem;
@@ -48,10 +48,6 @@ bool names(const Examination& examination, const std::string& topic) {
   return false;
 }
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 /// A folder of its own that goes with the object.
 struct Scratch {
   fs::path path = fs::temp_directory_path() / ("feltmap_doctor_" + std::to_string(std::random_device()()));
@@ -68,7 +64,7 @@ struct Tally {
 };
 
 void examine_recording(const Recording& recording, Tally& tally) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const fs::path path = bench::recorded(recording.name);
   const Scratch work;
   const char* const name = recording.name.c_str();
@@ -110,7 +106,7 @@ void examine_recording(const Recording& recording, Tally& tally) {
     if (!hit) print_evidence(examination, fault.topic + " " + said);
     std::fflush(stdout);
   }
-  std::printf("%-26.26s %.1f s\n", name, seconds_since(start));
+  std::printf("%-26.26s %.1f s\n", name, watch.seconds());
 }
 
 void print_table(const Tally& tally) {
@@ -132,7 +128,7 @@ void print_table(const Tally& tally) {
 int main(int argc, char** argv) {
   const std::vector<std::string> asked(argv + 1, argv + argc);
   Tally tally;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   for (const Recording& recording : kRecordings)
     if (asked.empty() || std::count(asked.begin(), asked.end(), recording.name) > 0)
       examine_recording(recording, tally);
@@ -142,6 +138,6 @@ int main(int argc, char** argv) {
   }
   print_table(tally);
   std::printf("%d of %d faults named (%.1f %%), %d of %d sound sequences accused, %.0f s\n", tally.named, tally.cases,
-              100.0 * tally.named / std::max(1, tally.cases), tally.accused, tally.sound, seconds_since(start));
+              100.0 * tally.named / std::max(1, tally.cases), tally.accused, tally.sound, watch.seconds());
   return tally.accused > 0 || tally.named < 0.95 * tally.cases;
 }

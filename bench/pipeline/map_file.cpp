@@ -15,7 +15,9 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <utility>
 
+#include "core/median.h"
 #include "io/map_file/map_file.h"
 #include "io/map_file/map_grids.h"
 
@@ -37,10 +39,9 @@ double seconds(const std::function<void()>& work) {
 }
 
 double median_of_five_s(const std::function<void()>& work) {
-  double t[5];
-  for (double& x : t) x = seconds(work);
-  std::nth_element(t, t + 2, t + 5);
-  return t[2];
+  std::vector<double> spent_s(5);
+  for (double& s : spent_s) s = seconds(work);
+  return median(std::move(spent_s));
 }
 
 /// A coloured wall with sensor-like noise and one to three classes a block: values as in a reconstruction.

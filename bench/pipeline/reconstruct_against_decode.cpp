@@ -4,7 +4,6 @@
 //
 // Both alternate within one run; medians and their ratio are printed. Fails where the command did not read every frame.
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -13,28 +12,22 @@
 #include <string>
 #include <vector>
 
+#include "core/median.h"
+#include "core/stopwatch.h"
 #include "io/files/system_memory.h"
 #include "io/sequence/decode_ahead.h"
 #include "io/sequence/open_sequence.h"
 
 namespace {
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 double decode_alone_s(const std::string& sequence, int threads, int64_t& frames) {
-  const auto start = Clock::now();
+  const felt::Stopwatch watch;
   const auto reader = felt::open_sequence(sequence);
   felt::DecodeAhead ahead(*reader, {.threads = threads});
   for (frames = 0; ahead.next(); ++frames) {
   }
-  return seconds_since(start);
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2), values.end());
-  return values[values.size() / 2];
+  return watch.seconds();
 }
 
 }  // namespace
@@ -56,9 +49,9 @@ int main(int argc, char** argv) {
   nlohmann::json report;
   for (int round = 0; round < rounds; ++round) {
     alone_s.push_back(decode_alone_s(sequence, threads, frames));
-    const auto start = Clock::now();
+    const felt::Stopwatch watch;
     if (std::system(command.c_str()) != 0) return 1;
-    whole_s.push_back(seconds_since(start));
+    whole_s.push_back(watch.seconds());
     report = nlohmann::json::parse(std::ifstream(out / "report.json"));
     if (report["frames"]["read"] != frames) {
       std::fprintf(stderr, "the command read %s frames of %lld\n", report["frames"]["read"].dump().c_str(),
@@ -67,8 +60,8 @@ int main(int argc, char** argv) {
     }
   }
   std::printf("%lld frames, %d threads, medians of %d: decoding alone %.3f s, whole command %.3f s, ratio %.2f\n",
-              static_cast<long long>(frames), threads, rounds, median(alone_s), median(whole_s),
-              median(whole_s) / median(alone_s));
+              static_cast<long long>(frames), threads, rounds, felt::median(alone_s), felt::median(whole_s),
+              felt::median(whole_s) / felt::median(alone_s));
   std::printf("least: decoding alone %.3f s, whole command %.3f s, ratio %.2f\n",
               *std::min_element(alone_s.begin(), alone_s.end()), *std::min_element(whole_s.begin(), whole_s.end()),
               *std::min_element(whole_s.begin(), whole_s.end()) / *std::min_element(alone_s.begin(), alone_s.end()));

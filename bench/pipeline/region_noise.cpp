@@ -12,6 +12,7 @@
 #include "bench/support/bench.h"
 #include "io/simulation/render_sequence.h"
 #include "io/simulation/scene.h"
+#include "io/simulation/scene_library.h"
 #include "io/simulation/touches.h"
 #include "io/simulation/trajectory.h"
 #include "mapping/fusion/tsdf_integrator.h"

@@ -10,6 +10,7 @@
 #include "core/simd.h"
 #include "io/pictures/plot_svg.h"
 #include "io/simulation/render_sequence.h"
+#include "io/simulation/scene_library.h"
 #include "mapping/fusion/tsdf_integrator.h"
 
 namespace {

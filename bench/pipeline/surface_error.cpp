@@ -9,6 +9,7 @@
 #include "core/simd.h"
 #include "io/meshes/mesh_io.h"
 #include "io/simulation/render_sequence.h"
+#include "io/simulation/scene_library.h"
 #include "mapping/evaluation/mesh_distance.h"
 #include "mapping/fusion/tsdf_integrator.h"
 #include "mapping/surface/marching_cubes.h"
@@ -38,8 +39,8 @@ std::vector<Eigen::Vector3f> seen_points(const std::vector<Frame>& exact, float 
 }
 
 void measure(const Case& scene, double voxel) {
-  const char* const distances[] = {"optical axis", "ray", "tangent plane"};
-  const char* const weights[] = {"constant", "1/z^2", "sensor noise"};
+  const char* const distances[] = {"optical-axis", "ray", "tangent-plane"};
+  const char* const weights[] = {"constant", "inverse-square", "sensor-noise"};
   for (int distance = 0; distance < 3; ++distance)
     for (int weight = 0; weight < 3; ++weight) {
       IntegrationConfig config;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -10,6 +9,8 @@
 #include <variant>
 #include <vector>
 
+#include "core/median.h"
+#include "core/stopwatch.h"
 #include "io/sequence/open_sequence.h"
 
 namespace felt::bench {
@@ -35,16 +36,13 @@ inline std::vector<Frame> decoded(const std::string& name, const SequenceOptions
   return frames;
 }
 
-inline double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + long(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
+using felt::median;
 
 template <typename F>
 double seconds(F&& work) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return watch.seconds();
 }
 
 }  // namespace felt::bench

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "core/median.h"
 #include "io/images/depth_encode.h"
 #include "io/images/image_encode.h"
 #include "io/sequence/convert.h"
@@ -202,10 +203,9 @@ inline std::vector<Fault> faults() {
            if (i > 0) steps.push_back(c.stamp_s[i] - c.stamp_s[i - 1]);
          }
          if (poses.size() < 8) return false;
-         std::nth_element(steps.begin(), steps.begin() + steps.size() / 2, steps.end());
          // Views with minutes between them have no motion to interpolate.
          if (c.views) return false;
-         if (*std::max_element(steps.begin(), steps.end()) > 5 * steps[steps.size() / 2]) return false;
+         if (*std::max_element(steps.begin(), steps.end()) > 5 * median(steps)) return false;
          Copy moved = c;
          moved.number.clear(), moved.stamp_s.clear(), moved.pose.clear();
          for (size_t i = 0; i < c.pose.size(); ++i) {

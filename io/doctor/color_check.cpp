@@ -8,6 +8,10 @@
 namespace felt {
 namespace {
 
+/// Share of the brightest channel by which the darkest is below it, from which on a colour is a thing's own: paler ones
+/// (snow, ice, white walls in the shade) have the tint of the light, which can be blue anywhere.
+constexpr double kLeastSaturation = 0.3;
+
 /// Whether a tenth of what is labelled is of a class that is blue by nature.
 bool cold_scene(const std::vector<SampledFrame>& frames, const ClassTable& classes) {
   std::vector<uint16_t> cold_ids;
@@ -34,17 +38,18 @@ std::optional<Finding> check_color_order(const std::vector<SampledFrame>& frames
         const Rgba8 c = frame.color(u, v);
         const int most = std::max({c.r, c.g, c.b}), least = std::min({c.r, c.g, c.b});
         if (c.a == 0 || most < 30 || least > 250) continue;  // too dark or too bright to have a colour
+        ++pixels;
+        if (most - least < kLeastSaturation * most) continue;
         warm += c.r - c.b;
         difference += std::abs(c.r - c.b);
-        ++pixels;
       }
   if (pixels == 0) return std::nullopt;
   Finding finding{"color-order", false, 0.5, "", "", ""};
   const double balance = warm / std::max(1.0, difference), contrast = difference / pixels;
   finding.evidence = "sum of R - B is " + number_text(balance, "%.2f") + " of the sum of |R - B|, which is " +
-                     number_text(contrast, "%.1f") + " a pixel; warm scenes have 0.3 to 0.9";
+                     number_text(contrast, "%.1f") + " a pixel (pale ones count as 0); rooms have 0.35 to 1";
   const bool cold = cold_scene(frames, classes);
-  // Nearly grey pictures tell nothing.
+  // Grey and pale pictures tell nothing.
   if (contrast < 3 || std::abs(balance) < 0.2 || (cold && balance < 0)) {
     finding.belief = cold ? "colour order cannot be told: snow, ice, sky or water may be in the pictures"
                           : std::string("colour order cannot be told from these colours; ") +

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
+#include "core/median.h"
 #include "io/sequence/recorded_pose.h"
 #include "io/sequence/trajectory_file.h"
 
@@ -86,10 +88,7 @@ PairScore score_pair(const SampledFrame& a, const SampledFrame& b, const Eigen::
   result.score = sum / double(std::max<size_t>(1, total));
   result.in_view = double(in_view) / double(std::max<size_t>(1, total));
   if (in_view > 0) result.meets = double(residuals.size()) / double(in_view);
-  if (!residuals.empty()) {
-    std::nth_element(residuals.begin(), residuals.begin() + residuals.size() / 2, residuals.end());
-    result.residual = residuals[residuals.size() / 2];
-  }
+  if (!residuals.empty()) result.residual = median(std::move(residuals));
   return result;
 }
 

@@ -10,8 +10,9 @@
 #include "io/doctor/proposal.h"
 #include "io/doctor/sample.h"
 #include "io/doctor/trajectory_check.h"
-#include "io/sequence/listed_sequence.h"
+#include "io/sequence/frame_selection.h"
 #include "io/sequence/open_sequence.h"
+#include "io/sequence/skip_reasons.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -44,7 +45,7 @@ void add_skipped(const Sample& sample, Finding& finding) {
   const bool none = sample.geometry.frames.empty();
   int64_t broken = 0;
   for (const auto& [reason, frames] : sample.skipped_frames) {
-    const bool of_image = reason.ends_with(" image") && !reason.starts_with("missing");
+    const bool of_image = is_of_broken_image(reason);
     if (of_image) broken += int64_t(frames.size());
     if (of_image || none) finding.evidence += "; " + reason + " in sampled frames " + frames_text(frames);
   }

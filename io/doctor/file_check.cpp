@@ -8,13 +8,11 @@
 #include <variant>
 
 #include "io/sequence/recorded_pose.h"
+#include "io/sequence/skip_reasons.h"
 
 namespace felt {
 namespace fs = std::filesystem;
 namespace {
-
-/// As layouts say it of frames whose colour image they look for by its stamp.
-constexpr const char* kMissingColor = "missing colour image";
 
 /// True where both sources hold the same bytes.
 bool same_bytes(const ImageSource& a, const ImageSource& b) {
@@ -52,7 +50,7 @@ std::vector<int64_t> numbers_missing(const std::vector<FrameRecord>& frames) {
 }
 
 /// Of a recording that lacks no depth image, what becomes of its frames: `reasons` as counted, not empty.
-std::string skipped_text(const std::map<std::string, int64_t>& reasons, size_t frames) {
+std::string unused_text(const std::map<std::string, int64_t>& reasons, size_t frames) {
   int64_t skipped = 0, colorless = 0;
   for (const auto& [reason, count] : reasons) {
     skipped += count;
@@ -86,9 +84,9 @@ Finding check_frames(const SequenceListing& listing) {
     return reasons.contains(reason) ? double(reasons.at(reason)) / double(frames.size()) : 0.0;
   };
   // Lost tracking and images without a partner belong to recording; more than that does not.
-  const bool many_poses_missing = share("missing pose") > 0.15 || share("non-finite pose") > 0.3;
-  const bool disordered = share("stamp out of order") > 0, unreadable = share("unreadable pose") > 0,
-             not_rigid = share("non-rigid pose") > 0, partnerless = share(kMissingColor) > 0.3;
+  const bool many_poses_missing = share(kMissingPose) > 0.15 || share(kNonFinitePose) > 0.3;
+  const bool disordered = share(kStampOutOfOrder) > 0, unreadable = share(kUnreadablePose) > 0,
+             not_rigid = share(kNonRigidPose) > 0, partnerless = share(kMissingColor) > 0.3;
   Finding finding{"frames",
                   !without_depth.empty() || !gaps.empty() || many_poses_missing || disordered || unreadable ||
                       not_rigid || partnerless,
@@ -98,7 +96,7 @@ Finding check_frames(const SequenceListing& listing) {
                   ""};
   finding.evidence = std::to_string(frames.size()) + " frames, numbers " + std::to_string(frames.front().index) +
                      " to " + std::to_string(frames.back().index);
-  for (const auto& [reason, count] : reasons) finding.evidence += ", " + std::to_string(count) + " " + reason;
+  if (!reasons.empty()) finding.evidence += ", " + skipped_text(reasons);
   if (!without_depth.empty()) {
     finding.belief = std::to_string(without_depth.size()) + " frames lack their depth image";
     finding.evidence += "; frames " + frames_text(without_depth);
@@ -108,7 +106,7 @@ Finding check_frames(const SequenceListing& listing) {
   } else if (finding.faulty) {
     finding.belief = "frames cannot be used for the reasons counted";
   } else if (!reasons.empty()) {
-    finding.belief = skipped_text(reasons, frames.size());
+    finding.belief = unused_text(reasons, frames.size());
   }
   // What the layout found out about stamps that do not meet says more than counts do.
   const auto of_stamps = std::find_if(listing.notes.begin(), listing.notes.end(), [](const std::string& note) {
@@ -144,7 +142,7 @@ bool repeats(const FrameRecord& before, const FrameRecord& frame, int64_t positi
   if (!same_depth && !same_color) return false;
   const ReadResult result = depth.read(position);
   const auto* decoded = std::get_if<Frame>(&result);
-  if (decoded == nullptr) return std::get<SkippedFrame>(result).reason != "depth all zero";
+  if (decoded == nullptr) return std::get<SkippedFrame>(result).reason != kDepthAllZero;
   if (same_depth && (same_color || frame.color.empty())) return !all_alike(decoded->depth_m);
   // One of the two alone: plain surfaces without noise, which take few bytes, look alike from many places.
   constexpr double kPlainBytesPerPixel = 0.05;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "core/median.h"
 
 namespace felt {
 namespace {
@@ -125,12 +128,8 @@ Agreement agreement_of(const std::vector<PairScore>& scores) {
     meets.push_back(score.meets);
     if (score.meets > 0) residuals.push_back(score.residual);
   }
-  const auto median = [](std::vector<double>& values) {
-    if (values.empty()) return 0.0;
-    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-    return values[values.size() / 2];
-  };
-  return {int(meets.size()), median(meets), median(residuals)};
+  const int pairs = int(meets.size());
+  return {pairs, median(std::move(meets)), median(std::move(residuals))};
 }
 
 double off_center(const PinholeCamera& c) {

@@ -10,7 +10,7 @@ namespace felt {
 namespace {
 
 /// Fewer pairs that tell accuse nothing: those of three frames, each seen from both sides, are hardly independent.
-constexpr int kLeastPairs = 5;
+constexpr int kLeastDecidedPairs = 5;
 
 /// What was told is right, though `best`, a little beside it, fits best.
 std::string right_enough(const std::string& told, const std::string& best) {
@@ -43,7 +43,7 @@ public:
     // Rendered surfaces that meet exactly, but only some of them, do so by their shape: walls slid along themselves.
     const bool by_shape =
         sample_.frames.size() < kFewFrames && mine.residual <= kNearestPixel && mine.meets < kNearlyAll;
-    const bool enough = least.decided >= kLeastPairs && !by_shape;
+    const bool enough = least.decided >= kLeastDecidedPairs && !by_shape;
     finding.faulty = differs && enough && convincing(least, least_gain);
     finding.evidence = std::to_string(least.won) + " of " + std::to_string(least.decided) +
                        " frame pairs that tell fit better: " + percent_text(mine.meets) +
@@ -95,6 +95,73 @@ Reading with_focal(Reading reading, double factor) {
   return reading;
 }
 
+void add_depth_scale(const GeometrySample& sample, const Reading& best, Findings& findings) {
+  // Rival scales: the one read now where the best differs, else the other known ones.
+  const double scale = sample.depth_scale / best.depth_factor;
+  const bool scale_differs = std::abs(std::log(best.depth_factor)) > 0.05;
+  std::vector<Reading> scales;
+  for (const double known : kDepthScales) {
+    Reading other = best;
+    other.depth_factor = scale_differs ? 1 : sample.depth_scale / known;
+    if (std::abs(std::log(other.depth_factor / best.depth_factor)) > 0.05) scales.push_back(other);
+    if (scale_differs) break;
+  }
+  if (scales.empty()) {
+    scales.push_back(best);
+    scales.back().depth_factor = 1.3;
+  }
+  const std::string best_scale = number_text(scale, "%.6g"), counts = "stored depth counts ", a_metre = " a metre";
+  findings.add("depth-scale", scale_differs,
+               scale_differs || best.depth_factor == 1
+                   ? counts + best_scale + a_metre
+                   : right_enough(counts + number_text(sample.depth_scale, "%.6g") + a_metre, best_scale),
+               "--depth-scale " + best_scale, scales);
+}
+
+void add_focal_length(const GeometrySample& sample, const Reading& best, Findings& findings) {
+  const PinholeCamera camera = camera_of(sample.camera, best);
+  const bool focal_differs = std::abs(std::log(best.focal_factor)) > 0.06;
+  const std::string given_focal = "the given focal length is right",
+                    best_focal = number_text(camera.fx, "%.4g") + " pixels, " + number_text(best.focal_factor, "%.3f") +
+                                 " times the given,";
+  findings.add("focal-length", focal_differs,
+               focal_differs            ? "a focal length of " + best_focal + " fits best"
+               : best.focal_factor == 1 ? given_focal
+                                        : right_enough(given_focal, best_focal),
+               intrinsics_option(camera.fx, camera.fy, camera.cx, camera.cy),
+               focal_differs ? std::vector<Reading>{with_focal(best, 1)}
+                             : std::vector<Reading>{with_focal(best, best.focal_factor * 1.1),
+                                                    with_focal(best, best.focal_factor / 1.1)});
+}
+
+/// Whether poses are those of the moments at which depth was taken.
+void add_stamp_offset(const GeometrySample& sample, const Reading& best, Findings& findings) {
+  const double spacing = sample.trajectory.spacing, delay = best.pose_delay;
+  if (!(spacing > 0)) return;
+  if (sample.frames.size() < kFewFrames) {
+    findings.list.push_back({"stamp-offset", false, 0.5,
+                             "it cannot be told from " + std::to_string(sample.frames.size()) +
+                                 " frames whether poses are those of the moments at which depth was taken",
+                             "", ""});
+    return;
+  }
+  // Real sensors are up to 25 ms apart; frames that only have numbers are taken for 30 a second.
+  const bool delay_differs = std::abs(delay) > (sample.stamped ? 0.025 : std::max(0.75, 0.15 * spacing));
+  const std::string at_once = "poses are those of the moments at which depth was taken",
+                    best_delay = number_text(std::abs(delay), "%.3g") + (sample.stamped ? " s" : " frame numbers") +
+                                 (delay > 0 ? " later" : " earlier");
+  findings.add("stamp-offset", delay_differs,
+               delay_differs ? "poses fit best when taken " + best_delay + " than depth is stamped"
+               : delay == 0  ? at_once
+                             : right_enough(at_once, best_delay),
+               "--stamp-offset " + number_text(sample.stamp_offset - delay, "%.4f"),
+               delay_differs
+                   ? std::vector<Reading>{with_delay(best, 0)}
+                   : std::vector<Reading>{with_delay(best, delay + spacing), with_delay(best, delay - spacing)},
+               // Slow cameras gain little from right stamps, but sound recordings gain nothing from wrong ones.
+               0.02);
+}
+
 }  // namespace
 
 std::vector<Finding> geometry_findings(const GeometrySample& sample, const Reading& best, bool thorough) {
@@ -121,77 +188,24 @@ std::vector<Finding> geometry_findings(const GeometrySample& sample, const Readi
                                            : "camera axes are OpenCV's (y down, z forward)",
                "--pose-convention " + to_string(best.convention), {other});
 
-  // Rival scales: the one read now where the best differs, else the other known ones.
-  const double scale = sample.depth_scale / best.depth_factor;
-  const bool scale_differs = std::abs(std::log(best.depth_factor)) > 0.05;
-  std::vector<Reading> scales;
-  for (const double known : kDepthScales) {
-    other = best;
-    other.depth_factor = scale_differs ? 1 : sample.depth_scale / known;
-    if (std::abs(std::log(other.depth_factor / best.depth_factor)) > 0.05) scales.push_back(other);
-    if (scale_differs) break;
-  }
-  if (scales.empty()) {
-    other.depth_factor = 1.3;
-    scales.push_back(other);
-  }
-  const std::string best_scale = number_text(scale, "%.6g"), counts = "stored depth counts ", a_metre = " a metre";
-  findings.add("depth-scale", scale_differs,
-               scale_differs || best.depth_factor == 1
-                   ? counts + best_scale + a_metre
-                   : right_enough(counts + number_text(sample.depth_scale, "%.6g") + a_metre, best_scale),
-               "--depth-scale " + best_scale, scales);
+  add_depth_scale(sample, best, findings);
   other = best;
   other.ray_length ^= true;
   findings.add("depth-along", best.ray_length != now.ray_length,
                best.ray_length ? "depth is the length of the ray" : "depth lies along the optical axis",
                best.ray_length ? "--ray-length" : "--no-ray-length", {other});
-  if (!thorough && !best.swapped_camera) return findings.list;
-
-  const PinholeCamera camera = camera_of(sample.camera, best);
-  const std::string intrinsics = intrinsics_option(camera.fx, camera.fy, camera.cx, camera.cy);
   if (best.swapped_camera) {
+    const PinholeCamera camera = camera_of(sample.camera, best);
     other = best;
     other.swapped_camera = false;
-    findings.add("image-size", true, "the camera is that of an image with width and height exchanged", intrinsics,
+    findings.add("image-size", true, "the camera is that of an image with width and height exchanged",
+                 intrinsics_option(camera.fx, camera.fy, camera.cx, camera.cy),
                  // The principal point, by now nearer to the middle of the image, speaks for it too.
                  {other}, kLeastGain - (off_center(sample.camera) - off_center(camera)));
   }
-  if (!thorough) return findings.list;
-  const bool focal_differs = std::abs(std::log(best.focal_factor)) > 0.06;
-  const std::string given_focal = "the given focal length is right",
-                    best_focal = number_text(camera.fx, "%.4g") + " pixels, " + number_text(best.focal_factor, "%.3f") +
-                                 " times the given,";
-  findings.add("focal-length", focal_differs,
-               focal_differs            ? "a focal length of " + best_focal + " fits best"
-               : best.focal_factor == 1 ? given_focal
-                                        : right_enough(given_focal, best_focal),
-               intrinsics,
-               focal_differs ? std::vector<Reading>{with_focal(best, 1)}
-                             : std::vector<Reading>{with_focal(best, best.focal_factor * 1.1),
-                                                    with_focal(best, best.focal_factor / 1.1)});
-  if (sample.trajectory.spacing > 0 && sample.frames.size() < kFewFrames) {
-    findings.list.push_back({"stamp-offset", false, 0.5,
-                             "it cannot be told from " + std::to_string(sample.frames.size()) +
-                                 " frames whether poses are those of the moments at which depth was taken",
-                             "", ""});
-  } else if (sample.trajectory.spacing > 0) {
-    const double spacing = sample.trajectory.spacing, delay = best.pose_delay;
-    // Real sensors are up to 25 ms apart; frames that only have numbers are taken for 30 a second.
-    const bool delay_differs = std::abs(delay) > (sample.stamped ? 0.025 : std::max(0.75, 0.15 * spacing));
-    const std::string at_once = "poses are those of the moments at which depth was taken",
-                      best_delay = number_text(std::abs(delay), "%.3g") + (sample.stamped ? " s" : " frame numbers") +
-                                   (delay > 0 ? " later" : " earlier");
-    findings.add("stamp-offset", delay_differs,
-                 delay_differs ? "poses fit best when taken " + best_delay + " than depth is stamped"
-                 : delay == 0  ? at_once
-                               : right_enough(at_once, best_delay),
-                 "--stamp-offset " + number_text(sample.stamp_offset - delay, "%.4f"),
-                 delay_differs
-                     ? std::vector<Reading>{with_delay(best, 0)}
-                     : std::vector<Reading>{with_delay(best, delay + spacing), with_delay(best, delay - spacing)},
-                 // Slow cameras gain little from right stamps, but sound recordings gain nothing from wrong ones.
-                 0.02);
+  if (thorough) {
+    add_focal_length(sample, best, findings);
+    add_stamp_offset(sample, best, findings);
   }
   return findings.list;
 }

@@ -160,12 +160,12 @@ std::optional<Finding> check_labels(const GeometrySample& sample, const Reading&
     const int mended = label_offset + offsets[best];
     finding.remedy = mended == 0 ? "leave out --label-offset" : "--label-offset " + std::to_string(mended);
   } else if (fits[0].unknown > 0.01) {
-    std::string ids;
+    std::vector<std::string> ids;
     for (const auto& [stored, c] : counts)
-      if (!classes.known(uint16_t(stored))) ids += (ids.empty() ? "" : ", ") + std::to_string(stored);
+      if (!classes.known(uint16_t(stored))) ids.push_back(std::to_string(stored));
     finding.faulty = true;
     finding.confidence = 0.9;
-    finding.belief = "labels hold ids that the class table lacks: " + ids;
+    finding.belief = "labels hold ids that the class table lacks: " + listed(ids);
     finding.remedy = "--classes with a table that names them";
   } else {
     finding.belief = "labels are ids of the class table";

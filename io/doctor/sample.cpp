@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "core/median.h"
 #include "io/sequence/listed_sequence.h"
 #include "io/sequence/recorded_pose.h"
 
@@ -19,12 +20,6 @@ namespace {
 constexpr int kPointsAFrame = 700;
 /// Frames, at least, whose colour is looked at.
 constexpr size_t kColorFrames = 10;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
-}
 
 std::vector<int64_t> sampled_positions(int64_t count, const SamplePlan& plan) {
   std::set<int64_t> positions;

@@ -7,7 +7,9 @@
 #include <numeric>
 #include <optional>
 #include <set>
+#include <utility>
 
+#include "core/median.h"
 #include "core/text.h"
 #include "io/doctor/sample.h"
 
@@ -19,7 +21,7 @@ bool overlaps(const PairScore& score) { return score.in_view > 0.1; }
 bool fits(const PairScore& score) { return overlaps(score) && score.meets > 0.4; }
 
 /// Fewer pairs that overlap say nothing.
-constexpr int kLeastPairs = 3;
+constexpr int kLeastOverlappingPairs = 3;
 
 struct Step {
   size_t from = 0;  ///< position in the trajectory
@@ -55,11 +57,7 @@ double smoothness(const RecordedTrajectory& trajectory) {
     near.push_back(distance(i, i + 1));
     any.push_back(distance(i, (i + 1 + (i * 7919) % (count - 1)) % count));
   }
-  const auto middle = [](std::vector<double>& v) {
-    std::nth_element(v.begin(), v.begin() + v.size() / 2, v.end());
-    return v[v.size() / 2];
-  };
-  return near.empty() ? 0 : middle(near) / std::max(1e-9, middle(any));
+  return median(std::move(near)) / std::max(1e-9, median(std::move(any)));
 }
 
 /// How many of the sampled frames fit their neighbours better with the pose of another frame, which fits better in
@@ -129,9 +127,9 @@ Finding check_trajectory(const GeometrySample& sample, const Reading& best, cons
       std::to_string(fitting) + " of " + std::to_string(asked) + " neighbouring frame pairs see the same surface";
   // Poses that are told a delay are between frames: which of them is whose cannot be asked.
   const bool slow = share >= 0.5 && best.pose_delay == 0;
-  const int exchanged = slow && overlapping >= kLeastPairs ? better_exchanged(sample, best) : 0;
+  const int exchanged = slow && overlapping >= kLeastOverlappingPairs ? better_exchanged(sample, best) : 0;
   const bool disordered = exchanged >= 3 && exchanged >= 0.4 * double(sample.frames.size());
-  if (overlapping < kLeastPairs) {
+  if (overlapping < kLeastOverlappingPairs) {
     finding.confidence = 0.5;
     finding.belief = "it cannot be told whether the trajectory fits the images: too few views overlap";
     return finding;

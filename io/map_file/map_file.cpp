@@ -216,15 +216,6 @@ std::string save_map(const Map& map, const fs::path& path, const SaveOptions& op
   return hash;
 }
 
-MapJournals load_journals(const fs::path& path) {
-  const std::string where = path.string();
-  const OpenedFile opened(path);
-  MapHeader header =
-      read_metadata(VdbReader(opened, verify_map_trailer(opened, where, kMapFileVersion), where).metadata(), where);
-  return {header.voxel_size_m, std::move(header.classes), std::move(header.properties), std::move(header.frames),
-          std::move(header.touches)};
-}
-
 Map load_map(const fs::path& path) {
   // Opened once: another program may replace the file meanwhile.
   const std::string where = path.string();

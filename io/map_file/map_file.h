@@ -48,16 +48,4 @@ struct ExaminedMap {
 /// does.
 ExaminedMap examine_map(const std::filesystem::path& path);
 
-/// What a map was made of.
-struct MapJournals {
-  double voxel_size_m = 0;
-  ClassTable classes;
-  PropertyTable properties;
-  FrameJournal frames;
-  TouchJournal touches;  ///< without their regions
-};
-
-/// The journals of a map file; its grids are only checked against the checksum. Throws as `load_map` does.
-MapJournals load_journals(const std::filesystem::path& path);
-
 }  // namespace felt

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/map_file/vdb_writer.h"
 #include "mapping/grids/vdb_classes.h"
 #include "mapping/grids/vdb_state.h"
@@ -26,8 +27,7 @@ bool chosen(const std::string& name, const std::vector<std::string>& asked) {
 
 void require_known(const std::vector<LeafGrid>& all, const std::vector<std::string>& asked) {
   std::vector<std::string> problems;
-  std::string names;
-  for (const LeafGrid& grid : all) names += (names.empty() ? "" : ", ") + grid.name;
+  const std::string names = listed(all, &LeafGrid::name);
   for (const std::string& a : asked)
     if (std::none_of(all.begin(), all.end(), [&](const LeafGrid& grid) { return chosen(grid.name, {a}); }))
       problems.push_back(describe_mismatch("--grids", "grid of the map", "one of " + names, "'" + a + "'"));

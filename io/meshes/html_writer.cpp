@@ -4,7 +4,6 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "core/error.h"
 #include "io/files/atomic_file.h"
 #include "io/files/json_text.h"
 #include "io/meshes/mesh_io.h"

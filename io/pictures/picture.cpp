@@ -4,7 +4,6 @@
 #include <cmath>
 #include <vector>
 
-#include "core/error.h"
 #include "io/files/atomic_file.h"
 #include "io/images/depth_encode.h"
 #include "io/images/image_encode.h"

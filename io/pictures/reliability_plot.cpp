@@ -1,6 +1,6 @@
 #include "io/pictures/reliability_plot.h"
 
-#include <cstdio>
+#include "core/text.h"
 
 namespace felt {
 
@@ -18,9 +18,8 @@ std::vector<Plot> reliability_plots(const CalibrationScores& s) {
     bins.y.push_back(double(bin.correct) / double(bin.count));
   }
   line.x = bins.x, line.y = bins.y;
-  char title[64];
-  std::snprintf(title, sizeof title, "Reliability (ECE %.4f)", s.ece());
-  Plot reliability{title, "confidence", "accuracy", {line, bins}, {}};
+  Plot reliability{
+      "Reliability (ECE " + number_text(s.ece(), "%.4f") + ")", "confidence", "accuracy", {line, bins}, {}};
   reliability.series.push_back({"calibrated", {0, 1}, {0, 1}, -1, PlotSeries::Style::dashed});
   return {reliability, {"How often", "confidence", "share of predictions", {share}, {}}};
 }

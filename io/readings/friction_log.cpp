@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -10,6 +9,8 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/median.h"
+#include "core/text.h"
 #include "io/files/text_input.h"
 
 namespace felt {
@@ -33,12 +34,6 @@ std::vector<size_t> columns_of(const std::vector<std::string>& header, const std
   }
   if (!missing.empty()) throw FormatError(describe_mismatch(where, "header", missing, "none"));
   return columns;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Longest run [begin, end) of indices in [from, to) where `keep` holds.
@@ -139,12 +134,6 @@ ForceLog read_force_log(const std::filesystem::path& file) {
 
 namespace {
 
-std::string text(double x) {
-  char buffer[32];
-  snprintf(buffer, sizeof buffer, "%g", x);
-  return buffer;
-}
-
 /// Forces along the normal and across it, the first turned so that the strongest presses.
 void project(const std::vector<Eigen::Vector3d>& force, const Eigen::Vector3d& normal, FrictionReading& out) {
   out.normal_n.clear();
@@ -192,10 +181,10 @@ void find_contact_in(FrictionReading& out, double contact_n) {
   std::tie(out.contact_begin, out.contact_end) =
       longest_run(0, out.normal_n.size(), [&](size_t i) { return out.normal_n[i] >= contact_n; });
   if (out.contact_end - out.contact_begin < kFewestSamples)
-    throw FormatError(describe_mismatch(
-        "force log", "contact",
-        "at least " + std::to_string(kFewestSamples) + " samples with a normal force of " + text(contact_n) + " N",
-        "at most " + text(strongest) + " N"));
+    throw FormatError(describe_mismatch("force log", "contact",
+                                        "at least " + std::to_string(kFewestSamples) +
+                                            " samples with a normal force of " + number_text(contact_n) + " N",
+                                        "at most " + number_text(strongest) + " N"));
 }
 
 /// What a sensor reads without contact, and how much it wavers: of samples that are `apart` from every contact.
@@ -294,12 +283,13 @@ Slide slide_of(const FrictionReading& reading, size_t firm_begin, size_t firm_en
     none("a twentieth of the contact's " + std::to_string(firm_end - firm_begin) + " samples or less, " +
          std::to_string(slide.end - slide.begin));
   if (const double change = std::abs(trend(ratio, slide.begin, slide.end)); change > within)
-    none("F_t/F_n that changes by " + text(change) + " about " + text(level) + ": loaded, but not sliding");
+    none("F_t/F_n that changes by " + number_text(change) + " about " + number_text(level) +
+         ": loaded, but not sliding");
   double tangential = 0;
   for (size_t i = slide.begin; i < slide.end; ++i) tangential += reading.tangential_n[i];
   tangential /= double(slide.end - slide.begin);
   if (tangential < 2 * wavers_n)
-    none("a tangential force of " + text(tangential) + " N where the sensor wavers by " + text(wavers_n) +
+    none("a tangential force of " + number_text(tangential) + " N where the sensor wavers by " + number_text(wavers_n) +
          " N without contact");
   return slide;
 }
@@ -310,16 +300,18 @@ FrictionReading friction_reading(const ForceLog& log, const FrictionSettings& se
   const size_t n = log.time_s.size();
   const double length = settings.normal.norm();
   if (!(length > 0) || !std::isfinite(length))
-    throw ConfigError(describe_mismatch("force log", "normal", "a direction", "a vector of length " + text(length)));
+    throw ConfigError(
+        describe_mismatch("force log", "normal", "a direction", "a vector of length " + number_text(length)));
   if (!(settings.contact_n > 0) || !std::isfinite(settings.contact_n))
-    throw ConfigError(describe_mismatch("force log", "contact force", "a positive number", text(settings.contact_n)));
+    throw ConfigError(
+        describe_mismatch("force log", "contact force", "a positive number", number_text(settings.contact_n)));
   std::vector<double> steps;
   for (size_t i = 1; i < n; ++i) steps.push_back(log.time_s[i] - log.time_s[i - 1]);
   const double rate_hz = 1 / median(steps);
   if (!(settings.cutoff_hz > 0) || settings.cutoff_hz >= rate_hz / 2)
     throw ConfigError(describe_mismatch("--cutoff", "frequency",
-                                        "between 0 and half the rate of the log, " + text(rate_hz) + " Hz",
-                                        text(settings.cutoff_hz)));
+                                        "between 0 and half the rate of the log, " + number_text(rate_hz) + " Hz",
+                                        number_text(settings.cutoff_hz)));
 
   const Eigen::Vector3d normal = settings.normal / length;
   std::vector<Eigen::Vector3d> force(n);

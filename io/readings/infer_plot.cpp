@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/text.h"
 #include "inference/dirichlet.h"
 #include "inference/material.h"
 #include "inference/mixture.h"
@@ -75,9 +76,7 @@ Plot panel(const Densities& d, const std::string& title, const std::vector<doubl
   };
   curve("all classes", -1, PlotSeries::Style::line, [&](double at) { return pdf(d.next, at); });
   for (size_t c = 0; c < d.next.component.size(); ++c) {
-    char weight[32];
-    std::snprintf(weight, sizeof weight, " %.3f", d.next.weight[c]);
-    curve(d.names[c] + weight, int(c), PlotSeries::Style::line,
+    curve(d.names[c] + number_text(d.next.weight[c], " %.3f"), int(c), PlotSeries::Style::line,
           [&](double at) { return d.next.weight[c] * pdf(d.next.component[c], at); });
   }
   if (exact) {
@@ -89,11 +88,7 @@ Plot panel(const Densities& d, const std::string& title, const std::vector<doubl
       return sum;
     });
   }
-  for (double reading : readings) {
-    char label[32];
-    std::snprintf(label, sizeof label, "%.4g", reading);
-    plot.markers.push_back({reading, label});
-  }
+  for (double reading : readings) plot.markers.push_back({reading, number_text(reading, "%.4g")});
   return plot;
 }
 

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <optional>
 #include <span>
 #include <string>
-#include <utility>
 
 #include "core/pose.h"
 #include "io/files/text_input.h"
@@ -53,34 +51,6 @@ ViewMask read_view_mask(const std::filesystem::path& file, const std::vector<dou
     throw ConfigError(describe_mismatch("--pose", "matrix", "a rigid transform", "another"));
   view.mask = image;
   return view;
-}
-
-std::vector<Eigen::Vector3d> read_points(const std::filesystem::path& file) {
-  const std::string content = read_file_or_pipe(file);
-  std::vector<Eigen::Vector3d> points;
-  std::vector<std::string> problems;
-  char separator = ',';
-  bool first = true;
-  for (LineReader lines(content, file); lines.next();) {
-    if (first) separator = csv_separator(lines.line());
-    const std::vector<std::string> cells = csv_cells(lines.line(), separator);
-    const bool header = std::exchange(first, false) && cells == std::vector<std::string>{"x", "y", "z"};
-    if (header) continue;
-    Eigen::Vector3d p;
-    bool good = cells.size() == 3;
-    for (size_t i = 0; i < 3 && good; ++i) {
-      const std::optional<double> coordinate = parse_number(cells[i]);
-      good = coordinate.has_value();
-      if (good) p[Eigen::Index(i)] = *coordinate;
-    }
-    if (good)
-      points.push_back(p);
-    else
-      problems.push_back(
-          describe_mismatch(lines.where(), "point", "x,y,z", "'" + std::string(lines.line().substr(0, 60)) + "'"));
-  }
-  if (!problems.empty()) throw FormatError(first_of(problems));
-  return points;
 }
 
 }  // namespace felt

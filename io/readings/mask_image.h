@@ -14,8 +14,4 @@ namespace felt {
 ViewMask read_view_mask(const std::filesystem::path& file, const std::vector<double>& intrinsics,
                         const std::vector<double>& pose);
 
-/// Points from text: one `x,y,z` a line; a header line `x,y,z`, empty lines and lines that start with '#' are skipped.
-/// Throws IoError, and FormatError with the first problem, its line, and how many more.
-std::vector<Eigen::Vector3d> read_points(const std::filesystem::path& file);
-
 }  // namespace felt

@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <utility>
 
+#include "core/text.h"
 #include "io/files/text_input.h"
 
 namespace felt {
@@ -19,15 +20,20 @@ public:
     for (size_t i = 0; i < names.size(); ++i)
       if (!at_.emplace(names[i], i).second)
         problems.push_back(describe_mismatch(where, "header", "each column once", "'" + names[i] + "' twice"));
-    std::string missing;
+    std::vector<std::string> missing;
     const auto need = [&](bool good, const char* what) {
-      if (!good) missing.append(missing.empty() ? "" : ", ").append(what);
+      if (!good) missing.emplace_back(what);
     };
     need(has("stamp") || has("frame"), "a column stamp or frame");
     need((has("x") && has("y") && has("z")) || (has("u") && has("v")), "columns x, y, z or u, v");
     need(has("property"), "a column property");
     need(has("value"), "a column value");
-    if (!missing.empty()) problems.push_back(describe_mismatch(where, "header", missing, "none"));
+    if (!missing.empty()) problems.push_back(describe_mismatch(where, "header", listed(missing), "none"));
+    // Columns of one's own are welcome, but a reading must not become exact for a slip of the pen.
+    if (!has("sigma"))
+      for (const std::string& name : names)
+        if (!nearest_word(name, {"sigma", "Sigma", "SIGMA"}).empty())
+          problems.push_back(describe_mismatch(where, "header", "'sigma'", "'" + name + "'"));
   }
   bool has(const std::string& name) const { return at_.contains(name); }
   size_t operator[](const std::string& name) const { return at_.at(name); }
@@ -52,7 +58,7 @@ RecordedTouch parse_row(const std::vector<std::string>& cells, const Columns& co
     if (!touch.frame)
       problems.push_back(describe_mismatch(where, "frame", "a frame number", "'" + cells[columns["frame"]] + "'"));
   }
-  const auto all = [&](const std::vector<const char*>& names, auto good) {
+  const auto all = [](std::initializer_list<const char*> names, auto good) {
     return std::all_of(names.begin(), names.end(), good);
   };
   const auto named = [&](const char* name) { return columns.has(name); };
@@ -82,11 +88,7 @@ Eigen::Vector3d point_under(const Frame& frame, const Eigen::Vector2d& uv) {
   return frame.T_world_camera * (frame.camera.ray(uv.x(), uv.y()) * depth);
 }
 
-std::string seconds_text(double seconds) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.6f", seconds);
-  return text;
-}
+std::string seconds_text(double seconds) { return number_text(seconds, "%.6f"); }
 
 /// The place of a touch's frame among the sequence's: that with its number, or the one nearest to its stamp.
 size_t place_of(const RecordedTouch& touch, const TouchedSequence& sequence) {

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/files/text_input.h"
 #include "io/files/yaml_problems.h"
 
@@ -196,21 +197,21 @@ std::vector<uint16_t> map_classes(const NetDescription& net, const ClassTable& t
   if (net.otherwise && !known(*net.otherwise))
     problems.push_back(describe_mismatch(where, "otherwise", "a class of the table", "'" + *net.otherwise + "'"));
   std::vector<uint16_t> slots;
-  std::string homeless;
+  std::vector<std::string> homeless;
   for (const std::string& name : net.classes) {
     std::string target = target_name(net, name);
     if (!net.mapping.contains(name) && !known(target)) {
       if (net.otherwise)
         target = *net.otherwise;
       else
-        homeless += (homeless.empty() ? "" : ", ") + name;
+        homeless.push_back(name);
     }
     const std::optional<int> slot = target == kNoClassName ? std::nullopt : table.slot_of_name(target);
     slots.push_back(slot ? uint16_t(*slot) : ClassTable::kNoSlot);
   }
   if (!homeless.empty())
     problems.push_back(describe_mismatch(where, "map", "a place in the class table for every class of the network",
-                                         "none for " + homeless + " (map them, or say `otherwise: none`)"));
+                                         "none for " + listed(homeless) + " (map them, or say `otherwise: none`)"));
   if (std::all_of(slots.begin(), slots.end(), [](uint16_t s) { return s == ClassTable::kNoSlot; }) && problems.empty())
     problems.push_back(
         describe_mismatch(where, "map", "at least one class of the network in the class table", "all of them none"));

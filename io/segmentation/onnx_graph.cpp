@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/files/protobuf.h"
 
 namespace felt {
@@ -57,14 +58,8 @@ OnnxGraph read_onnx_graph(std::string_view model, const std::string& where) {
 }
 
 std::string describe(const std::vector<OnnxValue>& values) {
-  std::string text;
-  for (const OnnxValue& value : values) {
-    text += (text.empty() ? "" : ", ") + value.name + " [";
-    for (size_t i = 0; i < value.shape.size(); ++i)
-      text += (i > 0 ? ", " : "") + (value.shape[i] < 0 ? "?" : std::to_string(value.shape[i]));
-    text += "]";
-  }
-  return text;
+  const auto length = [](int64_t n) { return n < 0 ? "?" : std::to_string(n); };
+  return listed(values, [&](const OnnxValue& value) { return value.name + " [" + listed(value.shape, length) + "]"; });
 }
 
 }  // namespace felt

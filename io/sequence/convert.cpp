@@ -6,11 +6,13 @@
 #include <cstdio>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/files/folder_in_progress.h"
 #include "io/files/text_input.h"
 #include "io/images/depth_encode.h"
 #include "io/images/image_encode.h"
 #include "io/images/label_images.h"
+#include "io/sequence/skip_reasons.h"
 #include "io/tables/class_table_file.h"
 
 namespace felt {
@@ -44,18 +46,9 @@ std::string named(const char* pattern, int64_t number) {
   return name;
 }
 
-std::string number(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return text;
-}
-
+std::string number(double value) { return number_text(value, "%.17g"); }
 /// For people: three digits.
-std::string short_number(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
+std::string short_number(double value) { return number_text(value, "%.3g"); }
 
 /// The 16 numbers by rows, `between` after each row but the last.
 std::string matrix_text(const Eigen::Isometry3d& T, const char* between) {
@@ -224,11 +217,7 @@ private:
     return text;
   }
 
-  static std::string number_with_microseconds(double value) {
-    char text[48];
-    std::snprintf(text, sizeof text, "%.6f", value);
-    return text;
-  }
+  static std::string number_with_microseconds(double value) { return number_text(value, "%.6f"); }
 
   const FileNames& names_;
   fs::path folder_;
@@ -245,12 +234,10 @@ private:
 };
 
 const FileNames& names_of(const std::string& layout) {
-  std::string known;
-  for (const FileNames& names : kLayouts) {
+  for (const FileNames& names : kLayouts)
     if (names.layout == layout) return names;
-    known += (known.empty() ? "" : ", ") + std::string(names.layout);
-  }
-  throw ConfigError(describe_mismatch("--to", "layout", "one of " + known, "'" + layout + "'"));
+  throw ConfigError(
+      describe_mismatch("--to", "layout", "one of " + listed(kLayouts, &FileNames::layout), "'" + layout + "'"));
 }
 
 }  // namespace
@@ -292,11 +279,9 @@ ConvertResult convert_sequence(const SequenceReader& reader, const fs::path& out
     if (progress && !progress(i + 1)) return {};
   }
   if (result.written == 0) {
-    std::string reasons;
-    for (const auto& [reason, count] : result.skipped)
-      reasons += (reasons.empty() ? ": " : ", ") + std::to_string(count) + " " + reason;
-    throw FormatError(
-        describe_mismatch(reader.info().path.string(), "frames", "at least one that can be read", "none" + reasons));
+    const std::string reasons = skipped_text(result.skipped);
+    throw FormatError(describe_mismatch(reader.info().path.string(), "frames", "at least one that can be read",
+                                        reasons.empty() ? "none" : "none: " + reasons));
   }
   if (2 * result.depth_out_of_range > result.depth_measured)
     throw FormatError(describe_mismatch(

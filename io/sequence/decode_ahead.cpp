@@ -1,7 +1,6 @@
 #include "io/sequence/decode_ahead.h"
 
 #include <algorithm>
-#include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <mutex>
@@ -10,14 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/stopwatch.h"
+
 namespace felt {
-namespace {
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-}  // namespace
 
 int64_t frame_bytes(const SequenceInfo& info) {
   const int64_t per_pixel = int64_t(sizeof(float)) + (info.has_color ? 4 : 0) + (info.has_labels ? 2 : 0) +
@@ -58,7 +52,7 @@ struct DecodeAhead::State {
   void decode_one(std::unique_lock<std::mutex>& lock) {
     const int64_t i = claimed++;
     lock.unlock();
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     Slot result;
     try {
       result.frame = reader.read(i);
@@ -66,7 +60,7 @@ struct DecodeAhead::State {
       result.fault = std::current_exception();
     }
     result.ready = true;
-    const double spent_s = seconds_since(start);
+    const double spent_s = watch.seconds();
     lock.lock();
     slot(i) = std::move(result);
     decode_s += spent_s;
@@ -92,9 +86,9 @@ struct DecodeAhead::State {
         decode_one(lock);
         continue;
       }
-      const auto start = std::chrono::steady_clock::now();
+      const Stopwatch watch;
       frame_ready.wait(lock, [&] { return mine.ready; });
-      wait_s += seconds_since(start);
+      wait_s += watch.seconds();
     }
     if (cancel != nullptr && *cancel) return std::nullopt;
     Slot result = std::exchange(mine, Slot());

@@ -9,11 +9,13 @@
 #include "io/images/depth_decode.h"
 #include "io/images/image_decode.h"
 #include "io/sequence/camera_file.h"
+#include "io/sequence/frame_selection.h"
 #include "io/sequence/lidar_scan.h"
 #include "io/sequence/probability_images.h"
 #include "io/sequence/recorded_pose.h"
 #include "io/sequence/registration.h"
 #include "io/sequence/sequence_fingerprint.h"
+#include "io/sequence/skip_reasons.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -279,7 +281,7 @@ DepthImage ListedSequence::read_depth(const ImageSource& source) const {
       return depth_of_scan(decode_scan(bytes, where), source.face);
     });
     if (std::none_of(depth_m.begin(), depth_m.end(), [](float depth) { return depth > 0; }))
-      throw Skip{"depth all zero", source.path.string()};
+      throw Skip{kDepthAllZero, source.path.string()};
     return depth_m;
   }
   const StoredDepth stored = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
@@ -289,7 +291,7 @@ DepthImage ListedSequence::read_depth(const ImageSource& source) const {
   });
   DepthImage depth_m = std::visit([&](const auto& image) { return metres_of(image, source); }, stored);
   if (std::none_of(depth_m.begin(), depth_m.end(), [](float depth) { return depth > 0; }))
-    throw Skip{"depth all zero", source.path.string()};
+    throw Skip{kDepthAllZero, source.path.string()};
   if (!undistortion_.empty()) depth_m = undistorted(depth_m, undistortion_, 0.0f);
   for (size_t p = 0; p < z_per_ray_length_.size(); ++p) depth_m.data()[p] *= z_per_ray_length_.data()[p];
   return depth_m;
@@ -433,17 +435,6 @@ ProbabilityImage ListedSequence::read_class_maps(const FrameRecord& frame) const
 }
 
 }  // namespace
-
-void select_frames(const FrameSelection& selection, SequenceListing& listing) {
-  const int64_t recorded = int64_t(listing.frames.size());
-  std::vector<FrameRecord> selected;
-  for (const int64_t i : selected_positions(selection, recorded))
-    selected.push_back(std::move(listing.frames[size_t(i)]));
-  listing.frames = std::move(selected);
-  if (listing.frames.empty())
-    throw ConfigError(describe_mismatch("frames " + to_string(selection), "selection",
-                                        "some of the " + std::to_string(recorded) + " frames", "none"));
-}
 
 std::unique_ptr<SequenceReader> make_listed_sequence(const fs::path& path, const SequenceOptions& options,
                                                      SequenceListing listing) {

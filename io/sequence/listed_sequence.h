@@ -7,9 +7,6 @@
 
 namespace felt {
 
-/// Leaves the selected frames in the listing. Throws ConfigError where there is none of them.
-void select_frames(const FrameSelection& selection, SequenceListing& listing);
-
 /// The one reader behind every layout: decodes the frames of a listing.
 ///
 /// A frame is skipped, with one of these reasons, where it cannot be fused: "<missing | truncated | unreadable |

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/files/text_input.h"
 #include "io/images/image_decode.h"
 #include "io/sequence/layouts.h"
@@ -21,16 +22,18 @@ namespace felt {
 namespace fs = std::filesystem;
 namespace {
 
+const Layout& layout_named(const std::string& name) {
+  if (name == "open3d") return kRedwoodLayout;
+  for (const Layout& layout : all_layouts())
+    if (name == layout.name) return layout;
+  throw ConfigError(
+      describe_mismatch("--format", "layout", "one of " + listed(all_layouts(), &Layout::name), "'" + name + "'"));
+}
+
 /// The layout that `path` is to be read as. ScanNet is distributed as containers and as folders exported from them.
 const Layout& layout_named(const std::string& name, const fs::path& path) {
   if (name == "scannet" && !kScanNetLayout.recognises(path) && kSensLayout.recognises(path)) return kSensLayout;
-  if (name == "open3d") return kRedwoodLayout;
-  std::string names;
-  for (const Layout& layout : all_layouts()) {
-    if (name == layout.name) return layout;
-    names += (names.empty() ? "" : ", ") + std::string(layout.name);
-  }
-  throw ConfigError(describe_mismatch("--format", "layout", "one of " + names, "'" + name + "'"));
+  return layout_named(name);
 }
 
 /// What lies directly in a folder, by ending: "4 files *.bag, 3 folders"; says so where they are recordings of ROS.
@@ -44,8 +47,7 @@ std::string contents_of(const fs::path& path) {
     of_ros |= ending == ".bag" || ending == ".mcap" || ending == ".db3";
     ++kinds[at->is_directory(fault) ? "folders" : ending.empty() ? "files without an ending" : "*" + ending];
   }
-  std::string text;
-  for (const auto& [kind, count] : kinds) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + kind;
+  std::string text = listed(kinds, [](const auto& kind) { return std::to_string(kind.second) + " " + kind.first; });
   if (text.empty()) text = "an empty folder";
   return of_ros ? text + " (ROS recordings are not read: export their images and poses first)" : text;
 }
@@ -173,7 +175,7 @@ void apply_options(const SequenceOptions& options, SequenceListing& listing) {
     shift_poses(options.pose_stamp_offset, listing);
   if (!(listing.depth_scale > 0 && listing.depth_scale < 1e9))
     throw ConfigError(describe_mismatch("depth scale", "units per metre", "a number above 0 and below 1000000000",
-                                        std::to_string(listing.depth_scale)));
+                                        number_text(listing.depth_scale)));
   choose_class_table(options, listing);
   const bool labelled = std::any_of(listing.frames.begin(), listing.frames.end(),
                                     [](const FrameRecord& frame) { return !frame.labels.empty(); });
@@ -206,6 +208,8 @@ std::span<const Layout> all_layouts() {
                                    kIclLayout,         kSceneNetLayout, kLidarLayout};
   return layouts;
 }
+
+void require_layout(const std::string& name) { layout_named(name); }
 
 SequenceListing list_sequence(const fs::path& path, const SequenceOptions& options) {
   return with_io_errors([&] {

@@ -9,6 +9,9 @@
 
 namespace felt {
 
+/// Throws ConfigError where `name` is not one that `SequenceOptions::format` may be.
+void require_layout(const std::string& name);
+
 /// What the layout of `path` finds, with the user's options applied: names, poses and camera as plain data, nothing
 /// decoded. All recorded frames, before any selection. Throws as `open_sequence` does.
 SequenceListing list_sequence(const std::filesystem::path& path, const SequenceOptions& options = {});

@@ -4,7 +4,6 @@
 #include <map>
 #include <numeric>
 
-#include "core/error.h"
 #include "io/files/text_input.h"
 #include "io/sequence/layouts/file_names.h"
 #include "io/sequence/side_images.h"

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/pose.h"
+#include "io/sequence/skip_reasons.h"
 #include "io/sequence/trajectory_file.h"
 
 namespace felt {
@@ -13,21 +14,21 @@ std::variant<Eigen::Isometry3d, PoseProblem> recorded_pose(const FrameRecord& fr
   if (frame.pose) {
     recorded = *frame.pose;
   } else if (std::error_code fault; frame.pose_file.empty() || !fs::exists(frame.pose_file, fault)) {
-    return PoseProblem{"missing pose", "no pose recorded"};
+    return PoseProblem{kMissingPose, "no pose recorded"};
   } else {
     where = frame.pose_file.string();
     try {
       recorded = read_pose_file(frame.pose_file);
     } catch (const Error& problem) {
-      return PoseProblem{"unreadable pose", problem.what()};
+      return PoseProblem{kUnreadablePose, problem.what()};
     }
   }
   Eigen::Isometry3d T;
   switch (rigid_pose(recorded, T)) {
     case PoseFault::not_finite:
-      return PoseProblem{"non-finite pose", where};
+      return PoseProblem{kNonFinitePose, where};
     case PoseFault::not_rigid:
-      return PoseProblem{"non-rigid pose", where};
+      return PoseProblem{kNonRigidPose, where};
     case PoseFault::none:
       break;
   }

@@ -45,10 +45,12 @@ std::string to_string(const PoseConvention& convention) {
 }
 
 DepthEncoding parse_depth_encoding(const std::string& text, const std::string& where) {
-  if (text == "plain") return DepthEncoding::plain;
-  if (text == "rotated3") return DepthEncoding::rotated3;
+  for (const DepthEncoding encoding : {DepthEncoding::plain, DepthEncoding::rotated3})
+    if (text == to_string(encoding)) return encoding;
   throw ConfigError(describe_mismatch(where, "depth encoding", "plain or rotated3", "'" + text + "'"));
 }
+
+std::string to_string(DepthEncoding encoding) { return encoding == DepthEncoding::rotated3 ? "rotated3" : "plain"; }
 
 std::string to_string(const Intrinsics& k) { return fmt::format("{:g}, {:g}, {:g}, {:g}", k.fx, k.fy, k.cx, k.cy); }
 

@@ -30,6 +30,7 @@ enum class DepthEncoding {
 
 /// Reads "plain" or "rotated3". Throws ConfigError.
 DepthEncoding parse_depth_encoding(const std::string& text, const std::string& where);
+std::string to_string(DepthEncoding encoding);
 
 /// fx, fy, cx, cy in pixels, without an image size.
 struct Intrinsics {

@@ -1,9 +1,7 @@
 #include "io/settings/label_settings.h"
 
-#include <cmath>
-#include <nlohmann/json.hpp>
-
 #include "core/error.h"
+#include "core/text.h"
 
 namespace felt {
 
@@ -30,9 +28,8 @@ std::vector<std::string> problems_of(const LabelSettings& settings) {
     // Sums of what is counted are 32-bit floats.
     constexpr double kLargest = 1e6;
     if (!value || ((*value > 0 || (zero_is_fine && *value == 0)) && *value <= kLargest)) return;
-    problems.push_back(describe_mismatch(option, what,
-                                         zero_is_fine ? "a number from 0 to 1e6" : "a number above 0, up to 1e6",
-                                         std::isfinite(*value) ? nlohmann::json(*value).dump() : "another"));
+    problems.push_back(describe_mismatch(
+        option, what, zero_is_fine ? "a number from 0 to 1e6" : "a number above 0, up to 1e6", number_text(*value)));
   };
   expect(settings.band_vox, false, "--label-band", "voxels");
   expect(settings.evidence, false, "--label-evidence", "evidence of an observation");

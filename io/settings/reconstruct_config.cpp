@@ -6,11 +6,11 @@
 #include <cmath>
 #include <functional>
 #include <map>
-#include <numeric>
+#include <ranges>
 #include <set>
-#include <utility>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/files/text_input.h"
 #include "io/files/yaml_problems.h"
 #include "io/sequence/pose_list.h"
@@ -76,13 +76,11 @@ ReadValue flag_into(std::optional<bool>& target) {
 
 template <typename T>
 ReadValue choice_into(std::optional<T>& target, const std::map<std::string, T>& choices) {
-  return [&target, choices](const YAML::Node& value, const std::string& where) {
-    std::string expected;
-    for (const auto& [name, choice] : choices) expected += (expected.empty() ? "" : ", ") + name;
-    const std::string text = text_of(value, where, "one of " + expected);
+  return [&target, &choices](const YAML::Node& value, const std::string& where) {
+    const std::string expected = "one of " + listed(std::views::keys(choices));
+    const std::string text = text_of(value, where, expected);
     const auto found = choices.find(text);
-    if (found == choices.end())
-      throw ConfigError(describe_mismatch(where, "value", "one of " + expected, "'" + text + "'"));
+    if (found == choices.end()) throw ConfigError(describe_mismatch(where, "value", expected, "'" + text + "'"));
     target = found->second;
   };
 }
@@ -166,12 +164,8 @@ std::map<std::string, ReadValue> readers_of(ReconstructConfig& c, const fs::path
       {"max_weight", number_into(c.max_weight, 1, true)},
       {"dropoff_start", number_into(c.dropoff_start_vox, 0, true)},
       {"color_band", number_into(c.color_band_vox, 0, true)},
-      {"distance", choice_into<DistanceModel>(c.distance, {{"optical-axis", DistanceModel::optical_axis},
-                                                           {"ray", DistanceModel::ray},
-                                                           {"tangent-plane", DistanceModel::tangent_plane}})},
-      {"weight", choice_into<WeightModel>(c.weight, {{"constant", WeightModel::constant},
-                                                     {"inverse-square", WeightModel::inverse_square},
-                                                     {"sensor-noise", WeightModel::sensor_noise}})},
+      {"distance", choice_into(c.distance, kDistanceNames)},
+      {"weight", choice_into(c.weight, kWeightNames)},
       {"carve", flag_into(c.carve)},
       {"label_band", number_into(c.label_settings.band_vox, 0, false)},
       {"label_evidence", number_into(c.label_settings.evidence, 0, false)},
@@ -188,42 +182,23 @@ std::map<std::string, ReadValue> readers_of(ReconstructConfig& c, const fs::path
   };
 }
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text.append(text.empty() ? "" : ", ").append(word);
-  return text;
-}
-
 }  // namespace
+
+const std::map<std::string, DistanceModel> kDistanceNames = {{"optical-axis", DistanceModel::optical_axis},
+                                                             {"ray", DistanceModel::ray},
+                                                             {"tangent-plane", DistanceModel::tangent_plane}};
+const std::map<std::string, WeightModel> kWeightNames = {{"constant", WeightModel::constant},
+                                                         {"inverse-square", WeightModel::inverse_square},
+                                                         {"sensor-noise", WeightModel::sensor_noise}};
 
 double parse_truncation(const std::string& text, double voxel_size_m, const std::string& where) {
   const bool in_voxels = text.ends_with("vox");
-  const std::string_view number_text(text.data(), text.size() - (in_voxels ? 3 : text.ends_with("m") ? 1 : 0));
-  const auto number = parse_number(number_text);
+  const std::string_view digits(text.data(), text.size() - (in_voxels ? 3 : text.ends_with("m") ? 1 : 0));
+  const auto number = parse_number(digits);
   if (!number || !std::isfinite(*number) || *number <= 0)
     throw ConfigError(describe_mismatch(where, "band around the surface", "metres such as 0.08, or voxels such as 4vox",
                                         "'" + text + "'"));
   return in_voxels ? *number * voxel_size_m : *number;
-}
-
-std::string nearest_word(const std::string& word, const std::vector<std::string>& known) {
-  // Levenshtein 1966, one row of the table at a time.
-  const auto distance = [](const std::string& a, const std::string& b) {
-    std::vector<size_t> row(b.size() + 1);
-    std::iota(row.begin(), row.end(), size_t(0));
-    for (size_t i = 1; i <= a.size(); ++i) {
-      size_t diagonal = std::exchange(row[0], i);
-      for (size_t j = 1; j <= b.size(); ++j)
-        diagonal = std::exchange(row[j], std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1])}));
-    }
-    return row.back();
-  };
-  std::string best;
-  size_t least = std::max<size_t>(2, word.size() / 2) + 1;
-  if (word.size() > 64) return best;
-  for (const std::string& candidate : known)
-    if (const size_t d = distance(word, candidate); d < least) least = d, best = candidate;
-  return best;
 }
 
 ReconstructConfig read_reconstruct_config(const fs::path& path) {
@@ -244,7 +219,7 @@ ReconstructConfig read_reconstruct_config(const fs::path& path) {
       const auto reader = readers.find(key);
       if (reader == readers.end()) {
         const std::string near = nearest_word(key, known);
-        found.problem(entry.first, "key", near.empty() ? "one of " + joined(known) : "'" + near + "'", "'" + key + "'");
+        found.problem(entry.first, "key", near.empty() ? "one of " + listed(known) : "'" + near + "'", "'" + key + "'");
         continue;
       }
       if (!seen.insert(key).second) {

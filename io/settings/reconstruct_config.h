@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,10 @@
 #include "mapping/fusion/integration_config.h"
 
 namespace felt {
+
+/// Names on the command line and in configuration files.
+extern const std::map<std::string, DistanceModel> kDistanceNames;
+extern const std::map<std::string, WeightModel> kWeightNames;
 
 /// A reconstruct configuration file: what it sets, checked one by one; what it leaves out is empty. Paths are absolute
 /// or relative to the working directory (in the file they are relative to the file).
@@ -45,8 +50,5 @@ ReconstructConfig read_reconstruct_config(const std::filesystem::path& path);
 
 /// Metres of a truncation written as metres ("0.08") or voxels ("4vox"). Throws ConfigError naming `where`.
 double parse_truncation(const std::string& text, double voxel_size_m, const std::string& where);
-
-/// The known word nearest to `word`: fewest insertions, deletions and replacements. Empty where none is near.
-std::string nearest_word(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace felt

@@ -1,7 +1,8 @@
+#include "io/simulation/rooms.h"
+
 #include <numbers>
 
 #include "io/simulation/furniture.h"
-#include "io/simulation/scene_library.h"
 
 namespace felt {
 namespace {

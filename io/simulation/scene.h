@@ -69,9 +69,4 @@ struct NearestSurface {
 NearestSurface nearest_surface(const Scene& scene, const Eigen::Vector3d& p_world);
 double signed_distance_m(const Scene& scene, const Eigen::Vector3d& p_world);
 
-/// Names of the built-in scenes, in the order in which `feltmap simulate --list` shows them.
-const std::vector<std::string>& scene_names();
-/// A built-in scene. Throws ConfigError that lists the names where there is none of this name.
-Scene make_scene(const std::string& name);
-
 }  // namespace felt

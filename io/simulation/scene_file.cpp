@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "core/utf8.h"
 #include "io/files/text_input.h"
 #include "io/files/yaml_problems.h"
@@ -71,9 +72,7 @@ private:
     double value = 0;
     if (node && node.IsScalar() && YAML::convert<double>::decode(node, value) && value >= low && value <= high)
       return value;
-    char range[80];
-    std::snprintf(range, sizeof range, "a number from %g to %g", low, high);
-    problem(node, what, range);
+    problem(node, what, "a number from " + number_text(low) + " to " + number_text(high));
     return low;
   }
   Vector3d vector(const YAML::Node& node, const std::string& what, double low = -1e4, double high = 1e4) {
@@ -89,20 +88,15 @@ private:
   }
   template <size_t N>
   int choice(const YAML::Node& node, const std::string& what, const char* const (&names)[N]) {
-    std::string expected;
-    for (size_t i = 0; i < N; ++i) {
+    for (size_t i = 0; i < N; ++i)
       if (node && node.IsScalar() && node.Scalar() == names[i]) return int(i);
-      expected += (expected.empty() ? "" : ", ") + std::string(names[i]);
-    }
-    problem(node, what, "one of " + expected);
+    problem(node, what, "one of " + listed(names));
     return 0;
   }
   uint16_t class_id(const YAML::Node& node, const std::string& what, const ClassTable& classes) {
     const auto slot = node && node.IsScalar() ? classes.slot_of_name(node.Scalar()) : std::nullopt;
     if (slot) return classes.at_slot(*slot).id;
-    std::string names;
-    for (int i = 0; i < classes.size(); ++i) names += (names.empty() ? "" : ", ") + classes.at_slot(i).name;
-    problem(node, what, "one of " + names);
+    problem(node, what, "one of " + listed(classes.classes(), &ClassInfo::name));
     return 0;
   }
   void bounds(const YAML::Node& root) {

@@ -6,8 +6,9 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/simulation/furniture.h"
-#include "io/simulation/trajectory.h"
+#include "io/simulation/rooms.h"
 
 namespace felt {
 namespace {
@@ -176,16 +177,13 @@ const std::vector<std::string>& scene_names() {
 }
 
 Scene make_scene(const std::string& name) {
-  std::string known;
   for (const auto& [candidate, make] : library()) {
-    if (candidate == name) {
-      Scene scene = make();
-      scene.name = name;
-      return scene;
-    }
-    known += (known.empty() ? "" : ", ") + candidate;
+    if (candidate != name) continue;
+    Scene scene = make();
+    scene.name = name;
+    return scene;
   }
-  throw ConfigError(describe_mismatch("simulate", "scene", "one of " + known, "'" + name + "'"));
+  throw ConfigError(describe_mismatch("simulate", "scene", "one of " + listed(scene_names()), "'" + name + "'"));
 }
 
 }  // namespace felt

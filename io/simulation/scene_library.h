@@ -1,11 +1,15 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "io/simulation/scene.h"
 
 namespace felt {
 
-/// Furnished room 1 .. 5: other sizes, layouts, colours and materials. Camera path and furniture keep clear of each
-/// other by at least 0.25 m.
-Scene furnished_room(int number);
+/// Names of the built-in scenes, in the order in which `feltmap simulate --list` shows them.
+const std::vector<std::string>& scene_names();
+/// A built-in scene. Throws ConfigError that lists the names where there is none of this name.
+Scene make_scene(const std::string& name);
 
 }  // namespace felt

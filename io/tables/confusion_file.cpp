@@ -4,26 +4,26 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <optional>
 #include <utility>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/files/text_input.h"
 #include "io/files/yaml_problems.h"
 
 namespace felt {
 namespace {
 
+constexpr const char* kExact = "%.17g";
+
 std::string quoted(const std::string& text) { return std::string(1, '\'').append(text).append(1, '\''); }
 
 /// The first few names, and how many more there are.
 std::string list_of(const std::vector<std::string>& names) {
   constexpr size_t kNamed = 3;
-  std::string text;
-  for (size_t i = 0; i < std::min(names.size(), kNamed); ++i) text.append(i == 0 ? "" : ", ").append(quoted(names[i]));
-  return names.size() > kNamed ? text + " and " + std::to_string(names.size() - kNamed) + " more" : text;
+  return listed(names, quoted, kNamed);
 }
 
 std::vector<std::string> split(const std::string& text, char separator) {
@@ -133,12 +133,6 @@ std::vector<double> parse_yaml_counts(const std::string& text, const ClassTable&
   }
 }
 
-std::string number_text(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return text;
-}
-
 }  // namespace
 
 std::vector<double> parse_confusion_counts(const std::string& text, const ClassTable& classes,
@@ -183,7 +177,8 @@ std::string confusion_counts_csv(std::span<const double> counts, const ClassTabl
   text += "\n";
   for (int i = 0; i < k; ++i) {
     text += csv_cell(classes.at_slot(i).name);
-    for (int j = 0; j < k; ++j) text.append(1, ',').append(number_text(counts[size_t(i) * size_t(k) + size_t(j)]));
+    for (int j = 0; j < k; ++j)
+      text.append(1, ',').append(number_text(counts[size_t(i) * size_t(k) + size_t(j)], kExact));
     text += "\n";
   }
   return text;
@@ -199,7 +194,8 @@ std::string confusion_counts_yaml(std::span<const double> counts, const ClassTab
   text += "]\ncounts:  # one row a true class, one column a predicted one, pixels\n";
   for (int i = 0; i < k; ++i) {
     text += "  - [";
-    for (int j = 0; j < k; ++j) text += (j ? ", " : "") + number_text(counts[size_t(i) * size_t(k) + size_t(j)]);
+    for (int j = 0; j < k; ++j)
+      text += (j ? ", " : "") + number_text(counts[size_t(i) * size_t(k) + size_t(j)], kExact);
     text += "]\n";
   }
   return text;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "mapping/store/block_store.h"
 #include "mapping/store/region.h"
 
 namespace felt {
@@ -21,6 +22,11 @@ BlockMask mask_where(const Active& active) {
     }
   }
   return mask;
+}
+
+/// The voxels of a block with a weight.
+inline BlockMask observed_voxels(const Block& block) {
+  return mask_where([weight = block.geometry->weight](int i) { return weight[i] > 0; });
 }
 
 }  // namespace felt

@@ -26,7 +26,7 @@ template <typename Value, typename Write>
 LeafGrid surface_grid(const Map& map, std::string name, Value background, const BlockList& list, Write write) {
   LeafGrid grid = state_grid<Value>(map, std::move(name), background, list, [write](const Block& block, Value* values) {
     write(block, values);
-    return mask_where([weight = block.geometry->weight](int i) { return weight[i] > 0; });
+    return observed_voxels(block);
   });
   grid.noisy = true;
   return grid;

@@ -1,5 +1,6 @@
 #include "mapping/maps/crop.h"
 
+#include "mapping/grids/leaf_mask.h"
 #include "mapping/touch/touch_update.h"
 #include "mapping/touch/voxel_beliefs.h"
 
@@ -13,13 +14,14 @@ Eigen::Vector3d center_m(const Map& map, const BlockCoord& coord, int offset) {
 
 /// The observed voxels, as block and offset, for which `inside` holds.
 template <typename Inside>
-Region observed_voxels(const Map& map, const Inside& inside) {
+Region observed_where(const Map& map, const Inside& inside) {
   Region region;
   for (const uint32_t number : map.store.sorted()) {
     const Block& block = map.store[number];
     BlockMask mask;
-    for (int i = 0; i < kBlockVoxels; ++i)
-      if (block.geometry->weight[i] > 0 && inside(VoxelRef{number, uint16_t(i)})) mask.set(i);
+    for_each_bit(observed_voxels(block), [&](int i) {
+      if (inside(VoxelRef{number, uint16_t(i)})) mask.set(i);
+    });
     if (mask.any()) region.append(block.coord, mask);
   }
   return region;
@@ -57,14 +59,14 @@ void copy_observed(const Block& from, const BlockMask& inside, BlockStore& store
 }  // namespace
 
 Region voxels_in(const Map& map, const Eigen::AlignedBox3d& box_m) {
-  return observed_voxels(map, [&](const VoxelRef& voxel) {
+  return observed_where(map, [&](const VoxelRef& voxel) {
     return box_m.contains(center_m(map, map.store[voxel.block].coord, voxel.offset));
   });
 }
 
 Region voxels_of_class(const Map& map, int slot) {
   const VoxelBeliefs beliefs(map);
-  return observed_voxels(map, [&](const VoxelRef& voxel) { return beliefs.strongest_class(voxel) == slot; });
+  return observed_where(map, [&](const VoxelRef& voxel) { return beliefs.strongest_class(voxel) == slot; });
 }
 
 Map cropped(const Map& map, const Region& region) {
@@ -76,10 +78,7 @@ Map cropped(const Map& map, const Region& region) {
   for (size_t b = 0; b < region.blocks(); ++b) {
     const Block* block = map.store.get(region.coord[b]);
     if (block == nullptr) continue;
-    BlockMask inside;
-    for_each_bit(region.mask[b], [&](int i) {
-      if (block->geometry->weight[i] > 0) inside.set(i);
-    });
+    const BlockMask inside = region.mask[b] & observed_voxels(*block);
     if (inside.any())
       copy_observed(*block, inside, result.store, result.store[result.store.find_or_create(block->coord)]);
   }
@@ -98,8 +97,7 @@ Eigen::AlignedBox3d observed_bounds(const Map& map) {
     // Most blocks lie inside what is already known.
     const bool known =
         bounds.contains(center_m(map, block.coord, 0)) && bounds.contains(center_m(map, block.coord, kBlockVoxels - 1));
-    for (int i = 0; !known && i < kBlockVoxels; ++i)
-      if (block.geometry->weight[i] > 0) bounds.extend(center_m(map, block.coord, i));
+    if (!known) for_each_bit(observed_voxels(block), [&](int i) { bounds.extend(center_m(map, block.coord, i)); });
   }
   return bounds;
 }

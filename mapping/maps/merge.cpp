@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "mapping/fusion/tsdf_kernels.h"
 #include "mapping/maps/table_difference.h"
 #include "mapping/touch/touch_update.h"
@@ -12,7 +13,7 @@
 namespace felt {
 namespace {
 
-std::string in_millimetres(double metres) { return std::to_string(metres * 1000) + " mm"; }
+std::string in_millimetres(double metres) { return number_text(metres * 1000, "%.9g") + " mm"; }
 
 /// Class table of the result: that of every map that has one.
 const ClassTable& common_classes(std::span<const Map* const> maps) {

@@ -83,15 +83,16 @@ std::vector<Region> segments(const Map& map, const RegionSettings& settings, siz
     const Block& block = map.store[number];
     if (block.evidence.empty()) continue;
     const BlockMask band = surface_band(block, band_m, float(settings.min_weight));
+    BlockMask tried;  // not `done`: a seed belongs to the region that it finds
     for (int tries = 0; tries < kSeedsPerBlock; ++tries) {
       // Beside a known segment lies its border: from there the same surface would be flooded again.
-      const BlockMask left = band - dilated_inside(done[block.coord]);
+      const BlockMask left = band - dilated_inside(done[block.coord] | tried);
       if (!left.any()) break;
       int seed = -1;
       for_each_bit(left, [&](int i) {
         if (seed < 0) seed = i;
       });
-      done[block.coord].set(seed);
+      tried.set(seed);
       const Index3 voxel = voxel_at(block.coord, seed);
       Region region;
       try {

@@ -10,6 +10,7 @@
 #include "io/map_file/map_file.h"
 #include "mapping/labels/class_belief.h"
 #include "tests/cli/command.h"
+#include "tests/cli/sequences.h"
 #include "tests/support/data.h"
 #include "tests/support/recorded_sequence.h"
 
@@ -18,8 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 using Catch::Matchers::Contains;
 using nlohmann::json;
-
-std::string quoted(const fs::path& path) { return "'" + path.string() + "'"; }
 
 /// A small recording whose network takes every third column's sofa (3) for a floor (2).
 struct Recording {

@@ -162,18 +162,21 @@ TEST_CASE("results that exist are refused before any work, and replaced with --f
   CHECK(file_text(out.path() / "map.vdb") != "precious");
 }
 
-TEST_CASE("every setting that cannot be used is named at once, with exit code 3") {
+TEST_CASE("all that cannot be read or used is named at once, with exit code 2 where it cannot be read, else 3") {
   const TemporaryDirectory out;
   const CommandResult result =
       reconstruct(boxes(), out.path() / "result",
                   "--voxel-size 0 --max-depth -1 --frames 5:2 --truncation wide --intrinsics 1,2,3 --depth-scale nan");
-  CHECK(result.exit_code == 3);
+  CHECK(result.exit_code == 2);
   for (const char* option :
        {"--voxel-size", "--max-depth", "--frames", "--truncation", "--intrinsics", "--depth-scale"}) {
     INFO(option << " in\n" << result.err);
     CHECK(result.err.find(option) != std::string::npos);
   }
   CHECK(line_count(result.err) == 6);
+  const CommandResult readable = reconstruct(boxes(), out.path() / "result", "--voxel-size 0 --max-depth -1");
+  CHECK(readable.exit_code == 3);
+  CHECK(line_count(readable.err) == 2);
   CHECK_FALSE(fs::exists(out.path() / "result"));
   for (const char* size : {"-0.02", "nan", "inf"}) {
     INFO(size);
@@ -330,6 +333,10 @@ TEST_CASE("info describes a map and a sequence") {
   CHECK(sequence.at("kind") == "sequence");
   CHECK(sequence.at("frames") == 12);
   CHECK(sequence.at("camera").at("width") == 160);
+  const std::string lines = run_feltmap("info " + quoted(boxes())).out;
+  for (const char* line :
+       {"\nframes: 12\n", "\ncamera:\n  width: 160\n", "\nclasses:\n  id 0, name ", "\nnotes: none\n"})
+    CHECK_THAT(lines, Catch::Matchers::Contains(line));
   CHECK(run_feltmap("info " + quoted(out.path() / "absent.vdb")).exit_code == 4);
 }
 

@@ -16,6 +16,7 @@
 namespace felt::test {
 namespace {
 using Catch::Matchers::Contains;
+using Catch::Matchers::Matches;
 
 /// A wall a metre in front of the camera, saved as map.vdb.
 std::filesystem::path wall_map(const TemporaryDirectory& folder) {
@@ -54,10 +55,35 @@ TEST_CASE("render names what it cannot use") {
   CHECK(classes.exit_code == 3);
   CHECK_THAT(classes.err, Contains("a map with classes"));
   const CommandResult both = run_feltmap("render " + map + " --pose 0,0,0,0,0,0,1 --out x --intrinsics 1,2 --size 0x5");
-  CHECK(both.exit_code == 3);
+  CHECK(both.exit_code == 2);
   CHECK_THAT(both.err, Contains("--intrinsics") && Contains("--size"));
   CHECK(run_feltmap("render " + (folder.path() / "absent.vdb").string() + " --pose 0,0,0,0,0,0,1 --out x").exit_code ==
         4);
+}
+
+TEST_CASE("render sees what a recorded sequence saw: its camera, the poses of the frames that were asked for") {
+  const TemporaryDirectory folder;
+  const std::string scene = (source_dir() / "data" / "scenes" / "table_wall").string(), map = wall_map(folder).string(),
+                    out = (folder.path() / "views").string();
+  const auto render = [&](const std::string& options) {
+    return run_feltmap("render " + map + " --images depth --json --out " + out + " --trajectory " + scene + " " +
+                       options);
+  };
+  const CommandResult result = render("--frames 1:6:2 --pose 0,0,0,0,0,0,1");
+  INFO(result.err);
+  REQUIRE(result.exit_code == 0);
+  CHECK(nlohmann::json::parse(result.out)["views"].size() == 4);
+  const cv::Mat recorded = cv::imread(scene + "/depth/000001.png", cv::IMREAD_UNCHANGED),
+                depth = cv::imread(out + "/000000.depth.png", cv::IMREAD_UNCHANGED);
+  REQUIRE_FALSE(recorded.empty());
+  CHECK(depth.size() == recorded.size());
+  CHECK(depth.at<uint16_t>(depth.rows / 2, depth.cols / 2) == 1000);
+  const CommandResult sized = render("--size 32x24");
+  CHECK(sized.exit_code == 2);
+  CHECK_THAT(sized.err, Contains("--size"));
+  const CommandResult idle = run_feltmap("render " + map + " --pose 0,0,0,0,0,0,1 --frames 0:1 --out " + out);
+  CHECK(idle.exit_code == 2);
+  CHECK_THAT(idle.err, Contains("--frames: expected --trajectory SEQUENCE"));
 }
 
 TEST_CASE("images are listed with commas or blanks, before or after the map") {
@@ -238,6 +264,12 @@ TEST_CASE(
   const auto properties = nlohmann::json::parse(result.out)["properties"];
   CHECK(properties["friction"]["readings"] == 3);
   CHECK(properties["refused"]["not on a labelled surface"] == 1);  // the one that this frame does not see
+  const std::string said = run_feltmap("evaluate " + out + "/map.vdb --reference-readings " + room +
+                                       "/touches.csv --properties " + room + "/properties.yaml")
+                               .out;
+  CHECK_THAT(said, Matches("friction +mean error [0-9.]+ +NLL [-0-9.]+ +CRPS [0-9.]+ +of 3 readings\n"
+                           "coverage +of 50 % intervals [0-9.]+ % +of 90 % intervals [0-9.]+ %\n"
+                           "not counted +1: not on a labelled surface\n"));
 }
 
 TEST_CASE("render says where nothing of what it was asked for is coloured") {
@@ -269,7 +301,7 @@ TEST_CASE("evaluate without a reference, and with one that is no mesh, says so")
     INFO(half);
     const CommandResult unsized =
         run_feltmap("evaluate " + map + " --reference-mesh x.ply --trajectory " + poses + " " + half);
-    CHECK(unsized.exit_code == 3);
+    CHECK(unsized.exit_code == 2);
     CHECK_THAT(unsized.err, Contains("expected --intrinsics and --size"));
   }
 }
@@ -346,7 +378,7 @@ TEST_CASE("evaluate looks at the frames that were asked for and says which optio
                                   std::string("--properties x.yaml"), "--trajectory " + poses}) {
     INFO(idle);
     const CommandResult refused = run_feltmap("evaluate " + map + " --reference-mesh " + reference + " " + idle);
-    CHECK(refused.exit_code == 3);
+    CHECK(refused.exit_code == 2);
     CHECK_THAT(refused.err, Contains(idle.substr(0, 6)));
   }
 }

@@ -5,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/cli/command.h"
+#include "tests/cli/sequences.h"
 #include "tests/support/data.h"
 #include "tests/support/onnx_model.h"
 
@@ -12,8 +13,6 @@ namespace felt::test {
 namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-std::string quoted(const fs::path& path) { return "'" + path.string() + "'"; }
 
 /// A stored scene and a network of three colours.
 struct Setting {

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "tests/cli/command.h"
+#include "tests/cli/sequences.h"
 #include "tests/support/data.h"
 #include "tests/support/views.h"
 
@@ -14,8 +15,6 @@ namespace felt::test {
 namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-std::string quoted(const fs::path& path) { return "'" + path.string() + "'"; }
 
 json ask(const std::string& arguments) {
   const CommandResult result = run_feltmap(arguments + " --json");
@@ -117,7 +116,7 @@ TEST_CASE("a vote without labels or without instances is an error that says so")
   for (const char* name : {"depth", "color"}) fs::copy(kScene / name, bare / name);
   const std::string out = " --out " + quoted(folder.path() / "out");
   const CommandResult neither = run_feltmap("segment " + quoted(bare) + out);
-  CHECK(neither.exit_code == 3);
+  CHECK(neither.exit_code == 2);
   CHECK(neither.err.find("--net or --vote") != std::string::npos);
   const CommandResult unlabelled = run_feltmap("segment " + quoted(bare) + " --vote geometric" + out);
   CHECK(unlabelled.exit_code == 4);

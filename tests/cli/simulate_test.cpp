@@ -1,28 +1,17 @@
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
-#include <map>
 
 #include "tests/cli/command.h"
 #include "tests/support/data.h"
+#include "tests/support/folder_content.h"
 
 namespace fs = std::filesystem;
+using felt::test::files_of;
 using felt::test::run_feltmap;
 using felt::test::TemporaryDirectory;
 
 namespace {
-
-/// Content by path below the folder.
-std::map<std::string, std::string> files_of(const fs::path& folder) {
-  std::map<std::string, std::string> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder))
-    if (entry.is_regular_file()) {
-      std::ifstream in(entry.path(), std::ios::binary);
-      files[fs::relative(entry.path(), folder)] = {std::istreambuf_iterator<char>(in), {}};
-    }
-  return files;
-}
 
 std::string quoted(const fs::path& path) { return std::string(" '").append(path.string()).append(1, '\''); }
 
@@ -53,6 +42,21 @@ TEST_CASE("simulate writes every file of the layout, the same bytes for any numb
     CHECK(files.count(name) == 1);
   CHECK(files == files_of(directory.path() / "three"));
   CHECK(std::distance(fs::directory_iterator(directory.path()), fs::directory_iterator()) == 2);
+}
+
+TEST_CASE("simulate says which touches a reconstruction cannot use as they are, and which cannot be made") {
+  const TemporaryDirectory directory;
+  const std::string small = "simulate boxes --frames 2 --width 64 --height 48 --touches 2 --no-mesh --force --out" +
+                            quoted(directory.path() / "out");
+  const auto things = run_feltmap(small);
+  CHECK(things.exit_code == 0);
+  CHECK_THAT(things.err, Catch::Contains("--touches") && Catch::Contains("reconstruct needs --properties"));
+  CHECK(run_feltmap(small + " --labels material").err.empty());
+  const fs::path table = directory.path() / "properties.yaml";
+  std::ofstream(table) << "stiffness: {unit: N/m, priors: {jelly: {mean: 5, sd: 1, readings: 9}}}\n";
+  const auto none = run_feltmap(small + " --labels material --properties" + quoted(table));
+  CHECK(none.exit_code == 0);
+  CHECK_THAT(none.err, Catch::Contains("no material of the scene has a prior of stiffness"));
 }
 
 TEST_CASE("an edited scene file is rendered like a built-in scene") {
@@ -99,7 +103,8 @@ TEST_CASE("what simulate cannot do is refused with the reason and its exit code,
   expect("boxes --frames 0" + out, 2, "--frames");
   expect("castle" + out, 3, "room1");
   expect("boxes --network perfect" + out, 3, "'perfect'");
-  expect("boxes --top 3" + out, 3, "--network");
+  expect("boxes --top 3" + out, 2, "--network");
+  expect("boxes --touch-where mistaken" + out, 2, "--labels material");
   expect("boxes --network nowhere.csv" + out, 4, "nowhere.csv");
   expect("nowhere.yaml" + out, 4, "nowhere.yaml");
   expect("boxes --out" + quoted(directory.path() / "missing" / "out"), 4, "missing");

@@ -69,7 +69,43 @@ TEST_CASE("a switch that is neither on nor off is named") {
     const CommandResult result = run_feltmap(std::string("reconstruct x --out y --bgr=") + value);
     CHECK(result.exit_code == 2);
     CHECK_THAT(result.err, Catch::Matchers::Contains(std::string("--bgr: expected true or false, found '") + value));
+    const CommandResult negated = run_feltmap(std::string("reconstruct x --out y --no-ray-length=") + value);
+    CHECK(negated.exit_code == 2);
+    CHECK_THAT(negated.err,
+               Catch::Matchers::Contains(std::string("--no-ray-length: expected true or false, found '") + value));
   }
+  CHECK(run_feltmap("reconstruct x --out y --ray-length --no-ray-length").exit_code == 2);
+}
+
+TEST_CASE("words of the command line that cannot be read are faults of it, whatever the command") {
+  const std::string room = (source_dir() / "data/scenes/room").string();
+  for (const std::string& command :
+       {"reconstruct " + room + " --out x", "doctor " + room, "info " + room, "convert " + room + " --out x",
+        "segment " + room + " --out x --vote geometric", "calibrate-labels " + room + " --reference-labels y --out x",
+        "evaluate x.vdb --reference-labels " + room, "render x.vdb --out x --trajectory " + room}) {
+    const CommandResult frames = run_feltmap(command + " --frames 5");
+    INFO(command << ": " << frames.err);
+    CHECK(frames.exit_code == 2);
+    CHECK_THAT(frames.err, Catch::Matchers::Contains("--frames: frames: expected a:b:step, found '5'"));
+    const CommandResult format = run_feltmap(command + " --format foo");
+    CHECK(format.exit_code == 2);
+    CHECK_THAT(format.err, Catch::Matchers::Contains("--format: layout: expected one of ") &&
+                               Catch::Matchers::Contains("found 'foo'"));
+  }
+}
+
+TEST_CASE("numbers that cannot be used are repeated as they were given, each once") {
+  const auto refused = [](const std::string& options, const std::string& found) {
+    const CommandResult result = run_feltmap("reconstruct x --out y " + options);
+    CHECK(result.exit_code == 3);
+    CHECK_THAT(result.err, Catch::Matchers::EndsWith("found " + found + "\n"));
+    CHECK(std::count(result.err.begin(), result.err.end(), '\n') == 1);
+  };
+  refused("--depth-scale 0", "0");
+  refused("--max-dt=-0.5", "-0.5");
+  refused("--stamp-offset nan", "nan");
+  refused("--label-band nan", "nan");
+  refused("--label-cap=-1", "-1");
 }
 
 TEST_CASE("help names what is given, shows defaults that hold, and examples whose files are there") {

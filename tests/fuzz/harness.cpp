@@ -18,7 +18,7 @@
 #include "io/readings/fit_priors.h"
 #include "io/readings/friction_log.h"
 #include "io/readings/infer_json.h"
-#include "io/readings/mask_image.h"
+#include "io/readings/points.h"
 #include "io/readings/touch_json.h"
 #include "io/readings/touches.h"
 #include "io/segmentation/network.h"

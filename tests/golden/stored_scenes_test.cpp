@@ -1,8 +1,6 @@
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <opencv2/core.hpp>
@@ -11,20 +9,12 @@
 #include <string>
 
 #include "tests/support/data.h"
+#include "tests/support/folder_content.h"
 
 namespace fs = std::filesystem;
+using felt::test::files_of;
 
 namespace {
-
-std::map<std::string, std::string> files_of(const fs::path& folder) {
-  std::map<std::string, std::string> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder))
-    if (entry.is_regular_file()) {
-      std::ifstream in(entry.path(), std::ios::binary);
-      files[fs::relative(entry.path(), folder)] = {std::istreambuf_iterator<char>(in), {}};
-    }
-  return files;
-}
 
 /// Greatest difference of two images of one kind and size, in steps of a channel; infinite where they are not.
 double pixel_difference(const std::string& a, const std::string& b) {

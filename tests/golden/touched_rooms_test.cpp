@@ -14,6 +14,7 @@
 #include "io/simulation/label_network.h"
 #include "io/simulation/render_sequence.h"
 #include "io/simulation/scene_file.h"
+#include "io/simulation/scene_library.h"
 #include "io/simulation/touches.h"
 #include "io/simulation/trajectory.h"
 #include "mapping/fusion/label_evidence.h"

@@ -229,7 +229,7 @@ TEST_CASE("every reason why maps cannot be merged is named at once") {
   a.classes = ClassTable({{1, "wood", {}, false}});
   c.classes = ClassTable({{1, "grass", {}, false}});
   const Map* const pointers[] = {&a, &b, &c};
-  CHECK_THROWS_WITH(merge(pointers), Contains("map 2: voxel size: expected 20.000000 mm, found 10.000000 mm") &&
+  CHECK_THROWS_WITH(merge(pointers), Contains("map 2: voxel size: expected 20 mm, found 10 mm") &&
                                          Contains("map 2: truncation") && Contains("map 3: class table"));
   CHECK_THROWS_AS(merge({}), ConfigError);
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mapping/touch/touch_update.h"
+
 namespace felt::test {
 
 ClassTable class_table(const std::vector<std::string>& names) {
@@ -44,6 +46,28 @@ Map labelled_map(double voxel_size_m, const Eigen::Vector3d& lo, const Eigen::Ve
         if (const int slot = label_at(p); slot >= 0 && std::abs(d) <= 1.5 * voxel_size_m)
           add_evidence(map, {x, y, z}, slot, counts);
       }
+  return map;
+}
+
+Map floor_of_wood_and_ice(const LabelAt& label_at, double prior_sd, float counts) {
+  Map map = labelled_map(
+      0.02, {-0.2, -0.2, -0.1}, {0.2, 0.2, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
+      class_table({"wood", "ice"}), label_at, counts);
+  Property friction;
+  friction.name = "friction";
+  friction.priors = {{"wood", {0.4, prior_sd, 50}}, {"ice", {0.1, prior_sd, 50}}};
+  map.properties = PropertyTable({friction});
+  return map;
+}
+
+int wood_then_ice(const Eigen::Vector3d& p) { return p.x() < 0 ? 0 : 1; }
+
+Map touched_floor(const LabelAt& label_at) {
+  Map map = floor_of_wood_and_ice(label_at);
+  TouchRequest request;
+  request.property = "friction";
+  request.value = 0.3;
+  add_touch(map, resolve_touch(map, request));
   return map;
 }
 

@@ -178,4 +178,25 @@ Frame frame_of(const SequenceReader& reader, int64_t i) {
   return std::get<Frame>(std::move(result));
 }
 
+SkippedFrame skip_of(const SequenceReader& reader, int64_t i) {
+  const ReadResult result = reader.read(i);
+  REQUIRE(std::holds_alternative<SkippedFrame>(result));
+  return std::get<SkippedFrame>(result);
+}
+
+void check_frame(const Frame& frame, int number, double depth_unit_m, int color_error) {
+  CHECK(frame.index == number);
+  CHECK(frame.camera == PinholeCamera{20, 20, 11.5, 7.5, kWidth, kHeight});
+  CHECK(frame.T_world_camera.isApprox(pose_at(number), 1e-9));
+  REQUIRE(frame.depth_m.width() == kWidth);
+  REQUIRE(frame.depth_m.height() == kHeight);
+  for (int u = 0; u < kWidth; ++u) CHECK(std::abs(frame.depth_m(u, 3) - depth_m_at(number, u)) <= 0.51 * depth_unit_m);
+  REQUIRE(frame.color.width() == kWidth);
+  const Rgba8 seen = frame.color(20, 9);
+  CHECK(std::abs(seen.r - 200) <= color_error);
+  CHECK(std::abs(seen.g - 90) <= color_error);
+  CHECK(std::abs(seen.b - number) <= color_error);
+  CHECK(seen.a == 255);
+}
+
 }  // namespace felt::test

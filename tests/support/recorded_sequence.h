@@ -36,5 +36,9 @@ void write_generic(const std::filesystem::path& folder, int frames);
 
 /// What `read(i)` gives; the test fails, with the reason, where it is a skip.
 Frame frame_of(const SequenceReader& reader, int64_t i);
+/// What `read(i)` says when it is expected to be a skip.
+SkippedFrame skip_of(const SequenceReader& reader, int64_t i);
+/// Checks that a frame is that of the recording with this number: depth to its unit, colour to `color_error` levels.
+void check_frame(const Frame& frame, int number, double depth_unit_m, int color_error);
 
 }  // namespace felt::test

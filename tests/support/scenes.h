@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "io/simulation/render_sequence.h"
+#include "io/simulation/scene_library.h"
 
 namespace felt::test {
 

@@ -17,8 +17,7 @@ std::optional<int64_t> trailing_number(std::string_view stem);
 std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder);
 
 /// Files directly in `folder` whose name is `prefix`, a number, `suffix` (one of `suffixes`, in capitals too), by that
-/// number. Numbers
-/// sort as numbers, whether or not they are padded with zeros. Empty where the folder is absent.
+/// number. Numbers sort as numbers, whether or not they are padded with zeros. Empty where the folder is absent.
 /// Throws IoError where the folder cannot be listed and FormatError where two names hold one number.
 std::map<int64_t, std::filesystem::path> numbered_files(const std::filesystem::path& folder, const std::string& prefix,
                                                         const std::vector<std::string>& suffixes);

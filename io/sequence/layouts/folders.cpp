@@ -1,4 +1,3 @@
-#include "core/error.h"
 #include "io/sequence/camera_file.h"
 #include "io/sequence/layouts.h"
 #include "io/sequence/layouts/file_names.h"

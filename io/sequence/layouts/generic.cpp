@@ -11,6 +11,7 @@
 #include "io/sequence/layouts.h"
 #include "io/sequence/layouts/file_names.h"
 #include "io/sequence/layouts/frame_files.h"
+#include "io/sequence/skip_reasons.h"
 #include "io/sequence/trajectory_file.h"
 #include "io/tables/class_table_file.h"
 
@@ -182,7 +183,7 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
       frame.stamp_s = poses[position].stamp_s;
       frame.pose = poses[position].matrix;
       if (disordered[position]) {
-        frame.fault = "stamp out of order";
+        frame.fault = kStampOutOfOrder;
         frame.fault_detail = (path / paths["poses"]).string() + ":" + std::to_string(poses[position].line) +
                              ": not after the stamps before it";
       }

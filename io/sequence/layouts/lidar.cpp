@@ -1,7 +1,6 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "core/pose.h"
 #include "io/files/text_input.h"
 #include "io/sequence/layouts.h"
 #include "io/sequence/layouts/file_names.h"

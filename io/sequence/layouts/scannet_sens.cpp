@@ -7,6 +7,7 @@
 #include "io/sequence/camera_file.h"
 #include "io/sequence/layouts.h"
 #include "io/sequence/layouts/file_names.h"
+#include "io/sequence/skip_reasons.h"
 
 // ScanNet's .sens container, version 4 (Dai et al., CVPR 2017; layout as its SensorData reader documents it): a header,
 // then per frame a pose, two stamps, two sizes, the compressed colour and depth. Opening walks over the frame headers
@@ -94,7 +95,7 @@ void list_lost_frames(const fs::path& path, uint64_t whole, uint64_t count, Sequ
     FrameRecord frame;
     frame.index = int64_t(i);
     frame.stamp_s = listing.stamped ? last_stamp_s : double(i);
-    frame.fault = "missing depth image";
+    frame.fault = kMissingDepth;
     frame.fault_detail = path.string() + ": ends before frame " + std::to_string(i);
     frames.push_back(std::move(frame));
   }
@@ -146,7 +147,7 @@ SequenceListing list(const fs::path& file_or_folder, const SequenceOptions& opti
     const uint64_t color_at = file.at();
     const bool whole = color_bytes <= file.left() && depth_bytes <= file.left() - color_bytes;
     if (!whole) {
-      frame.fault = "truncated depth image";
+      frame.fault = kTruncatedDepth;
       frame.fault_detail = path.string() + ": ends within frame " + std::to_string(i);
       listing.frames.push_back(std::move(frame));
       break;

@@ -1,20 +1,19 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/files/text_input.h"
 #include "io/sequence/layouts.h"
 #include "io/sequence/layouts/file_names.h"
 #include "io/sequence/layouts/frame_files.h"
+#include "io/sequence/skip_reasons.h"
 #include "io/sequence/trajectory_file.h"
 
 namespace felt {
 namespace fs = std::filesystem;
 namespace {
-
-constexpr const char* kMissingColor = "missing colour image";
 
 struct StampedFile {
   double stamp_s = 0;
@@ -51,12 +50,6 @@ std::vector<double> sort_by_stamp(std::vector<T>& items) {
   return stamps;
 }
 
-std::string number_text(double number, const char* format) {
-  char text[40];
-  std::snprintf(text, sizeof text, format, number);
-  return text;
-}
-
 /// "first to last" of ascending stamps, `offset` added.
 std::string range_text(const std::vector<double>& stamps, double offset = 0) {
   return number_text(stamps.front() + offset, "%.16g") + " to " + number_text(stamps.back() + offset, "%.16g");
@@ -88,7 +81,7 @@ void note_stamps_without_pose(const fs::path& trajectory, const std::vector<doub
   }
   listing.notes.push_back(describe_mismatch(
       trajectory.string(), "stamps",
-      "poses within " + number_text(options.max_dt_s, "%g") + " s of the depth images of " + range_text(depth_stamps),
+      "poses within " + number_text(options.max_dt_s) + " s of the depth images of " + range_text(depth_stamps),
       range_text(pose_stamps, options.pose_stamp_offset) + ": no pose for " + std::to_string(without) + " of " +
           std::to_string(listing.frames.size()) + " images, the smallest difference " +
           number_text(least_dt_s, "%.3g") + " s" + unit_question(depth_stamps, pose_stamps) +
@@ -101,8 +94,7 @@ void note_depth_without_color(const SequenceOptions& options, SequenceListing& l
                                      [](const FrameRecord& f) { return f.fault == kMissingColor; });
   if (double(without) <= 0.3 * double(listing.frames.size())) return;
   listing.notes.push_back(std::to_string(without) + " of " + std::to_string(listing.frames.size()) +
-                          " depth images have no colour image of their own within " +
-                          number_text(options.max_dt_s, "%g") +
+                          " depth images have no colour image of their own within " + number_text(options.max_dt_s) +
                           " s and are skipped: --no-color uses them without, --max-dt allows another difference");
 }
 
@@ -134,10 +126,10 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
       frame.fault_detail =
           (path / "depth.txt").string() + ": stamp " + number_text(frame.stamp_s, "%.6f") + ": " + what;
     };
-    const std::string within = " within " + number_text(options.max_dt_s, "%g") + " s";
-    if (disordered[i]) refuse("stamp out of order", "not after the stamps before it");
+    const std::string within = " within " + number_text(options.max_dt_s) + " s";
+    if (disordered[i]) refuse(kStampOutOfOrder, "not after the stamps before it");
     frame.pose = pose_at_stamp(poses, pose_stamps, frame.stamp_s - options.pose_stamp_offset, options.max_dt_s);
-    if (!frame.pose) refuse("missing pose", "no pose" + within);
+    if (!frame.pose) refuse(kMissingPose, "no pose" + within);
     // Colour belongs to one depth image only, the nearest to it: a neighbour's colour would be smeared over this one.
     const int64_t partner = nearest_stamp(color_stamps, frame.stamp_s, options.max_dt_s);
     const int64_t its_depth =

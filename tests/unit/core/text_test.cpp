@@ -45,4 +45,10 @@ TEST_CASE("a list says its items in other words, by a function or a member") {
         "1 a, 2 b");
 }
 
+TEST_CASE("the nearest known word is suggested, and none where nothing is near") {
+  CHECK(nearest_word("max_dpeth", {"max_depth", "min_depth", "max_dt"}) == "max_depth");
+  CHECK(nearest_word("voxelsize", {"max_depth", "voxel_size"}) == "voxel_size");
+  CHECK(nearest_word("zzzz", {"max_depth", "voxel_size"}).empty());
+}
+
 }  // namespace felt::test

@@ -6,6 +6,7 @@
 #include "bench/support/corrupt.h"
 #include "core/error.h"
 #include "core/text.h"
+#include "io/doctor/color_check.h"
 #include "io/doctor/file_check.h"
 #include "io/doctor/geometry_findings.h"
 #include "io/doctor/label_check.h"
@@ -84,7 +85,7 @@ TEST_CASE("the doctor accuses no sound sequence and proposes settings that suit 
 }
 
 TEST_CASE("the doctor accuses none of the stored scenes, however few and flat their views are") {
-  for (const char* name : {"table_wall"}) {
+  for (const char* name : {"table_wall", "ice_crossing"}) {
     INFO(name);
     const fs::path scene = source_dir() / "data" / "scenes" / name;
     CHECK(accused_topics(examine_sequence(scene)) == "");
@@ -155,6 +156,20 @@ TEST_CASE("the doctor's label offset counts from the one that is told") {
   CHECK(remedy(0) == "--label-offset -1");
   CHECK(remedy(3) == "--label-offset 2");
   CHECK(remedy(1) == "leave out --label-offset");
+}
+
+TEST_CASE("pale blue is the light's and exchanges nothing, deep blue all over does") {
+  const auto finding = [](std::vector<Rgba8> colors) {
+    std::vector<SampledFrame> frames;
+    for (const Rgba8& color : colors) frames.emplace_back().color = ColorImage(64, 48, color);
+    return *check_color_order(frames, ClassTable(), false);
+  };
+  const Rgba8 ice{206, 226, 238, 255}, blue{60, 90, 150, 255}, wood{150, 90, 60, 255};
+  CHECK_FALSE(finding({ice, ice}).faulty);
+  CHECK_THAT(finding({ice, ice}).belief, Catch::Contains("cannot be told"));
+  CHECK(finding({ice, blue}).faulty);
+  CHECK(finding({blue}).remedy == "--bgr");
+  CHECK(finding({ice, ice, wood}).belief == "colours are RGB");
 }
 
 TEST_CASE("a camera exchanged against the evidence is not named, though it were the best") {

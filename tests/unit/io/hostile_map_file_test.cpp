@@ -79,22 +79,6 @@ std::function<void(LeafGrid&)> voxel_off() {
   });
 }
 
-/// A floor of wood and ice that was touched, so that a file has every view.
-Map touched_floor() {
-  Map map = test::labelled_map(
-      0.02, {-0.2, -0.2, -0.1}, {0.2, 0.2, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
-      test::class_table({"wood", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 0 : 1; });
-  Property friction;
-  friction.name = "friction";
-  friction.priors = {{"wood", {0.4, 0.05, 50}}, {"ice", {0.1, 0.05, 50}}};
-  map.properties = PropertyTable({friction});
-  TouchRequest request;
-  request.property = "friction";
-  request.value = 0.3;
-  add_touch(map, resolve_touch(map, request));
-  return map;
-}
-
 }  // namespace
 
 TEST_CASE(
@@ -144,7 +128,7 @@ TEST_CASE(
 TEST_CASE("what a file's views say must follow from its map") {
   const test::TemporaryDirectory directory;
   const auto path = directory.path() / "map.vdb";
-  const Map map = touched_floor();
+  const Map map = test::touched_floor(test::wood_then_ice);
   const auto faulty = [&](const std::string& grid, const std::function<void(LeafGrid&)>& alter) {
     save_altered(map, path, grid, alter);
     std::vector<std::string> grids;
@@ -200,7 +184,7 @@ TEST_CASE("a map file is sound as it was saved, with its views or without") {
     CHECK(compact.views == 0);
   };
   require_sound(Map(0.03, 0.12));
-  require_sound(touched_floor());
+  require_sound(test::touched_floor(test::wood_then_ice));
   require_sound(test::random_map({.seed = 2, .blocks = 30, .classes = 4, .shared_evidence = true, .instances = true}));
 }
 

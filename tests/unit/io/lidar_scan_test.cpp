@@ -98,7 +98,7 @@ TEST_CASE("scans are a sequence: the first alone at the origin without poses, se
   const auto without_poses = open_sequence(folder.path());
   REQUIRE(without_poses->size() == 8);
   CHECK(std::holds_alternative<Frame>(without_poses->read(0)));
-  CHECK(std::get<SkippedFrame>(without_poses->read(4)).reason == "missing pose");
+  CHECK(skip_of(*without_poses, 4).reason == "missing pose");
   write_text(folder.path() / "poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 7 1 0 0 0 0 0 1 0\n");
   const auto two = open_sequence(folder.path());
   REQUIRE(two->size() == 8);

@@ -75,12 +75,6 @@ TEST_CASE("a configuration that is no YAML or no table is refused with its line"
   CHECK(!read_reconstruct_config(file).voxel_size_m);
 }
 
-TEST_CASE("the nearest known word is suggested, and none where nothing is near") {
-  CHECK(nearest_word("max_dpeth", {"max_depth", "min_depth", "max_dt"}) == "max_depth");
-  CHECK(nearest_word("voxelsize", {"max_depth", "voxel_size"}) == "voxel_size");
-  CHECK(nearest_word("zzzz", {"max_depth", "voxel_size"}).empty());
-}
-
 TEST_CASE("a truncation is metres or voxels") {
   CHECK(parse_truncation("0.08", 0.02, "--truncation") == 0.08);
   CHECK(parse_truncation("0.08m", 0.02, "--truncation") == 0.08);

@@ -7,6 +7,7 @@
 
 #include "io/map_file/map_file.h"
 #include "io/readings/mask_image.h"
+#include "io/readings/points.h"
 #include "io/readings/touch_json.h"
 #include "io/tables/property_yaml.h"
 #include "tests/support/data.h"
@@ -76,6 +77,10 @@ TEST_CASE("points are read with or without a header, by commas or semicolons, af
              "1;-2;0.5\n3;4;5\n") == expected);
   CHECK_THROWS_WITH(read("1,2\n1,2,3,4\nx,y,z\n"),
                     file.string() + ":1: point: expected x,y,z, found '1,2' (and 2 more faults)");
+  CHECK(read("id,z,x,y,note\n7,0.5,1,-2,door\n8,5,3,4,\n") == expected);
+  CHECK_THROWS_WITH(read("id,x,y,z\n7,1,-2\n8,3,4,5\n"),
+                    file.string() + ":2: point: expected 4 cells, numbers in x, y and z, found '7,1,-2'");
+  CHECK_THROWS_WITH(read("x,y,z,x\n1,2,3,4\n"), Catch::Contains("expected x,y,z, found 'x,y,z,x'"));
   CHECK_THROWS_WITH(read_points(folder.path()), Catch::Contains("found a folder"));
 }
 
@@ -95,6 +100,14 @@ TEST_CASE("the first fault of a touch file is named with its line, and how many 
   CHECK_THROWS_WITH(parse_touches("x,y,z\n", "t.csv"), Catch::Contains("stamp or frame") && Catch::Contains("value"));
   CHECK_THROWS_WITH(parse_touches("", "t.csv"), Catch::Contains("empty file"));
   CHECK_THROWS_AS(read_touches("/does/not/exist.csv"), IoError);
+}
+
+TEST_CASE("columns of one's own do not count, a misspelt sigma is no such") {
+  CHECK(parse_touches("id,frame,x,y,z,property,value,note\n1,7,1,2,3,friction,0.3,wet\n", "t.csv").size() == 1);
+  for (const char* slip : {"sgima", "Sigma", "sigma_"})
+    CHECK_THROWS_WITH(parse_touches(std::string("frame,x,y,z,property,value,") + slip + "\n", "t.csv"),
+                      "t.csv:1: header: expected 'sigma', found '" + std::string(slip) + "'");
+  CHECK(parse_touches("frame,x,y,z,property,value,sigma,sigma2\n7,1,2,3,friction,0.3,0.1,\n", "t.csv")[0].sigma == 0.1);
 }
 
 TEST_CASE("a pixel touch lands where its frame saw the surface, one outside the sequence is refused") {

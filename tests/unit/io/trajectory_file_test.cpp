@@ -56,3 +56,10 @@ TEST_CASE("a pose on a stamp is the recorded one, and one beside a pose that is 
   CHECK(pose_at_stamp(lost, kStamps, 10.01, 0.04)->isApprox(lost[0].matrix, 1e-12));
   CHECK_FALSE(pose_at_stamp(lost, kStamps, 10.039, 0.04)->allFinite());
 }
+
+TEST_CASE("stamps that break the order are as few as can be") {
+  CHECK(out_of_order({1, 2, 9, 3, 4}) == std::vector<bool>{false, false, true, false, false});
+  CHECK(out_of_order({5, 1, 2, 3}) == std::vector<bool>{true, false, false, false});
+  CHECK(out_of_order({1, NAN, 2}) == std::vector<bool>{false, true, false});
+  CHECK(out_of_order({}).empty());
+}

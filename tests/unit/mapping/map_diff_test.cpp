@@ -140,18 +140,9 @@ TEST_CASE("classes are compared by name, and a flip is a voxel whose leading cla
 }
 
 TEST_CASE("a flip is told from priors and touches too, as in the grid of labels") {
-  const auto wall = [] {
-    Map map = test::labelled_map(
-        0.02, {-0.2, -0.2, -0.1}, {0.2, 0.2, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
-        test::class_table({"wood", "ice"}), [](const Eigen::Vector3d&) { return 0; }, 1);
-    Property friction;
-    friction.name = "friction";
-    friction.priors = {{"wood", {0.4, 0.02, 50}}, {"ice", {0.1, 0.02, 50}}};
-    map.properties = PropertyTable({friction});
-    return map;
-  };
-  const Map before = wall();
-  Map touched = wall();
+  const auto wooden = [] { return test::floor_of_wood_and_ice([](const Eigen::Vector3d&) { return 0; }, 0.02, 1); };
+  const Map before = wooden();
+  Map touched = wooden();
   for (int i = 0; i < 8; ++i) {
     TouchRequest r;
     r.point_m = {0, 0, 0};
@@ -174,7 +165,7 @@ TEST_CASE("a flip is told from priors and touches too, as in the grid of labels"
   CHECK(difference(touched, touched).class_flips == 0);
 
   // Ice has so great a prior that one observation of wood does not outweigh it.
-  Map icy = wall();
+  Map icy = wooden();
   std::vector<ClassInfo> classes = icy.classes.classes();
   for (ClassInfo& c : classes)
     if (c.name == "ice") c.prior = 5;
@@ -224,16 +215,6 @@ TEST_CASE("maps with equal values and other journals are equal, and the journals
 }
 
 TEST_CASE("touches that only one map has, and regions that differ, are beyond every tolerance") {
-  const auto wall = [] {
-    Map map = test::labelled_map(
-        0.02, {-0.2, -0.2, -0.1}, {0.2, 0.2, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
-        test::class_table({"wood", "ice"}), [](const Eigen::Vector3d& p) { return p.x() < 0 ? 0 : 1; });
-    Property friction;
-    friction.name = "friction";
-    friction.priors = {{"wood", {0.4, 0.05, 50}}, {"ice", {0.1, 0.05, 50}}};
-    map.properties = PropertyTable({friction});
-    return map;
-  };
   const auto request = [](double x) {
     TouchRequest r;
     r.point_m = {x, 0, 0};
@@ -241,8 +222,9 @@ TEST_CASE("touches that only one map has, and regions that differ, are beyond ev
     r.value = 0.3;
     return r;
   };
-  const Map untouched = wall();
-  Map a = wall(), b = wall();
+  const auto floor = [] { return test::floor_of_wood_and_ice(test::wood_then_ice); };
+  const Map untouched = floor();
+  Map a = floor(), b = floor();
   add_touch(a, resolve_touch(a, request(-0.1)));
   MapDifference d = difference(untouched, a);
   CHECK(d.touches_only_b == 1);

@@ -91,20 +91,7 @@ TEST_CASE("each broken invariant is named with its grid, its count and the voxel
 }
 
 TEST_CASE("a touched map is sound, and each way to break its touches is named") {
-  const auto touched = [] {
-    Map map = test::labelled_map(
-        0.02, {-0.2, -0.2, -0.1}, {0.2, 0.2, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
-        test::class_table({"wood", "ice"}), [](const Eigen::Vector3d&) { return 1; });
-    Property friction;
-    friction.name = "friction";
-    friction.priors = {{"wood", {0.4, 0.05, 50}}, {"ice", {0.1, 0.05, 50}}};
-    map.properties = PropertyTable({friction});
-    TouchRequest request;
-    request.property = "friction";
-    request.value = 0.3;
-    add_touch(map, resolve_touch(map, request));
-    return map;
-  };
+  const auto touched = [] { return test::touched_floor([](const Eigen::Vector3d&) { return 1; }); };
   CHECK(verify(touched()).empty());
   const auto broken = [](const Map& map, const std::string& grid) {
     for (const MapFault& fault : verify(map))

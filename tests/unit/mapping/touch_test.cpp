@@ -6,61 +6,23 @@
 #include <utility>
 #include <vector>
 
-#include "inference/information_gain.h"
 #include "inference/mixture.h"
-#include "mapping/maps/merge.h"
 #include "mapping/touch/touch_mixture.h"
-#include "mapping/touch/touch_suggestion.h"
 #include "mapping/touch/touch_update.h"
 #include "mapping/touch/touch_view.h"
 #include "tests/support/labelled_map.h"
+#include "tests/support/material_floors.h"
 
 using namespace felt;
 using namespace felt::test;
 
 namespace {
 
-constexpr double kVoxel = 0.02;
-
-PropertyTable friction() {
-  Property p;
-  p.name = "friction";
-  p.support_lo = 0;
-  p.priors = {{"concrete", {0.543, 0.065, 50}}, {"grass", {0.577, 0.077, 50}},  {"rock", {0.478, 0.133, 50}},
-              {"wood", {0.372, 0.055, 50}},     {"rubber", {0.616, 0.048, 50}}, {"plastic", {0.311, 0.045, 50}},
-              {"snow", {0.390, 0.071, 50}},     {"ice", {0.192, 0.046, 50}}};
-  return PropertyTable({p});
-}
-
-const std::vector<std::string> kMaterials{"concrete", "grass", "rock", "wood", "rubber", "plastic", "snow", "ice"};
-enum Material { concrete, grass, rock, wood, rubber, plastic, snow, ice };
-
-/// A floor of two materials that meet at x = 0, with `counts` observations of the class that vision takes them for.
-Map two_floors(int left, int right, float counts) {
-  Map map = labelled_map(
-      kVoxel, {-0.4, -0.4, -0.1}, {0.4, 0.4, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
-      class_table(kMaterials), [&](const Eigen::Vector3d& p) { return p.x() < 0 ? left : right; }, counts);
-  map.properties = friction();
-  return map;
-}
-
-TouchRequest reading(double x, double y, double value, double stamp_s = 0, TouchModel model = TouchModel::material) {
-  TouchRequest request;
-  request.stamp_s = stamp_s;
-  request.point_m = {x, y, 0};
-  request.property = "friction";
-  request.value = value;
-  request.model = model;
-  return request;
-}
-
-uint64_t touch(Map& map, const TouchRequest& request) { return add_touch(map, resolve_touch(map, request)); }
-
 /// Vision counts that a later frame would add.
 void another_frame(Map& map, int slot) {
   for (Block& block : map.store.blocks())
     for (int i = 0; i < kBlockVoxels; ++i)
-      if (std::abs(block.geometry->tsdf[i]) <= float(kVoxel) && block.geometry->weight[i] > 0) {
+      if (std::abs(block.geometry->tsdf[i]) <= float(kFloorVoxel_m) && block.geometry->weight[i] > 0) {
         const Index3 f = first_voxel(block.coord), v = voxel_of_offset(i);
         add_evidence(map, {f.x + v.x, f.y + v.y, f.z + v.z}, slot, 1);
       }
@@ -229,28 +191,6 @@ TEST_CASE("touches in any order, before, between and after frames, give the same
   }
 }
 
-TEST_CASE("undo gives back the map as it was, redo the map as it became") {
-  Map map = two_floors(snow, wood, 7);
-  const std::string untouched = map_hash(map);
-  const uint64_t first = touch(map, reading(-0.2, 0, 0.3));
-  const std::string once = map_hash(map);
-  const uint64_t second = touch(map, reading(-0.2, 0.1, 0.5, 1));
-  const std::string twice = map_hash(map);
-  CHECK(untouched != once);
-  CHECK(once != twice);
-  undo_touch(map, first);
-  CHECK(map_hash(map) != twice);
-  redo_touch(map, first);
-  CHECK(map_hash(map) == twice);
-  undo_touch(map, second);
-  CHECK(map_hash(map) == once);
-  undo_touch(map, first);
-  CHECK(map_hash(map) == untouched);
-  CHECK(Beliefs(map).at({-10, 0, 0}).readings[0] == 0);
-  CHECK_THROWS_WITH(undo_touch(map, first), Catch::Contains("undone already"));
-  CHECK_THROWS_WITH(undo_touch(map, 1), Catch::Contains("no such id"));
-}
-
 TEST_CASE("each voxel of a mixture region has the scalar update of its own state") {
   Map map = two_floors(snow, wood, 3);
   std::mt19937 rng(3);
@@ -288,8 +228,8 @@ TEST_CASE("mixture readings go on from material ones, also where classes have no
   std::vector<std::string> names = kMaterials;
   names.push_back("paper");  // whose friction nobody measured
   Map map = labelled_map(
-      kVoxel, {-0.2, -0.2, -0.1}, {0.2, 0.2, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); }, class_table(names),
-      [](const Eigen::Vector3d& p) { return p.x() < 0 ? int(snow) : 8; }, 5);
+      kFloorVoxel_m, {-0.2, -0.2, -0.1}, {0.2, 0.2, 0.1}, [](const Eigen::Vector3d& p) { return p.z(); },
+      class_table(names), [](const Eigen::Vector3d& p) { return p.x() < 0 ? int(snow) : 8; }, 5);
   map.properties = friction();
   TouchRequest first = reading(-0.1, 0.05, 0.19);
   first.region.rule = RegionRule::sphere;
@@ -384,34 +324,6 @@ TEST_CASE("views hold the label and the property of touched voxels") {
   CHECK(voxels == map.touches.touches[0].region.voxels() + map.touches.touches[1].region.voxels());
 }
 
-TEST_CASE("a suggestion says what a touch there would teach") {
-  Map map = two_floors(snow, wood, 7);
-  const std::vector<Suggestion> suggestions = suggest_touches(map, "friction", {});
-  REQUIRE(suggestions.size() == 2);
-  for (const Suggestion& s : suggestions) {
-    INFO("at x = " << s.point_m.x());
-    CHECK(std::abs(s.point_m.z()) < 1e-6);
-    CHECK(s.normal.z() == Approx(1));
-    const auto there = [&](double value) { return resolve_touch(map, reading(s.point_m.x(), s.point_m.y(), value)); };
-    const Region region = there(0.3).region;
-    CHECK(double(s.voxels) == Approx(double(region.voxels())).epsilon(1e-3));
-    // 20 columns of voxels to the left of x = 0, 21 from there on, 41 rows.
-    CHECK(s.area_m2 == Approx((s.point_m.x() < 0 ? 20 : 21) * 41 * kVoxel * kVoxel).epsilon(0.03));
-    const Belief belief = Beliefs(map).of(region, {});
-    CHECK(s.gain_nat == Approx(information_gain(belief.next_reading[0]).value).epsilon(1e-9));
-    REQUIRE_FALSE(s.outcomes.empty());
-    CHECK(s.outcomes[0].slot == (s.point_m.x() < 0 ? snow : wood));
-    for (const Outcome& outcome : s.outcomes) {
-      CHECK(outcome.probability == Approx(belief.class_probability[size_t(outcome.slot)]).epsilon(1e-9));
-      const TouchEffect effect = apply_touch(map, there(outcome.reading));
-      undo_touch(map, effect.id);
-      for (size_t c = 0; c < 8; ++c)
-        CHECK(outcome.class_probability[c] == Approx(effect.after.class_probability[c]).epsilon(1e-9));
-    }
-  }
-  CHECK(suggestions[0].gain_nat * suggestions[0].area_m2 >= suggestions[1].gain_nat * suggestions[1].area_m2);
-}
-
 TEST_CASE("untouched segments keep every bit") {
   Map map = two_floors(snow, wood, 20);
   const Block before = *map.store.get(block_of_voxel({10, 0, 0}));
@@ -449,56 +361,6 @@ TEST_CASE("a reading that cannot be true is refused with the reason and leaves t
   refused(request, "mask image");
   map.classes = class_table({"carpet", "tiles"});
   refused(reading(0.1, 0, 0.3), "with a prior");
-}
-
-TEST_CASE("joining two journals gives every touch once, whichever comes first") {
-  Map map = two_floors(snow, wood, 4);
-  TouchJournal left, right;
-  const Touch shared = resolve_touch(map, reading(-0.2, 0, 0.3, 2));
-  insert(left, resolve_touch(map, reading(-0.2, 0, 0.2, 3)));
-  insert(left, shared);
-  insert(right, resolve_touch(map, reading(0.2, 0, 0.4, 1)));
-  insert(right, shared);
-  const TouchJournal both = joined(left, right);
-  REQUIRE(both.touches.size() == 3);
-  CHECK(both.touches[0].request.stamp_s == 1);
-  CHECK(both.touches[2].request.stamp_s == 3);
-  CHECK(journal_digest(both) == journal_digest(joined(right, left)));
-}
-
-TEST_CASE("a touch that two journals share is undone where both say so, and has the regions of both") {
-  Map map = two_floors(snow, wood, 4);
-  const Touch touch = resolve_touch(map, reading(-0.2, 0, 0.3)), elsewhere = resolve_touch(map, reading(0.2, 0, 0.3));
-  REQUIRE_FALSE(touch.region == elsewhere.region);
-  for (const bool undone_left : {false, true})
-    for (const bool undone_right : {false, true}) {
-      INFO("undone left " << undone_left << ", right " << undone_right);
-      TouchJournal left, right;
-      const uint64_t id = insert(left, touch);
-      REQUIRE(insert(right, touch) == id);
-      left.find(id)->undone = undone_left;
-      right.find(id)->undone = undone_right;
-      right.find(id)->region = elsewhere.region;
-      for (const TouchJournal& both : {joined(left, right), joined(right, left)}) {
-        REQUIRE(both.touches.size() == 1);
-        CHECK(both.touches[0].undone == (undone_left && undone_right));
-        CHECK((both.touches[0].region == united(touch.region, elsewhere.region)));
-      }
-    }
-}
-
-TEST_CASE("a merged map holds the touches of both maps") {
-  Map left = two_floors(snow, wood, 4), right = two_floors(snow, wood, 4);
-  touch(left, reading(-0.2, 0, 0.15, 1));
-  touch(right, reading(-0.2, 0, 0.17, 2));
-  const Map* maps[] = {&left, &right};
-  const Map merged = merge(maps);
-  const Belief belief = Beliefs(merged).at({-10, 0, 0});
-  CHECK(belief.readings[0] == 2);
-  CHECK(most_probable_class(belief.class_probability) == ice);
-  const Block& block = *merged.store.get(block_of_voxel({-10, 0, 0}));
-  REQUIRE(block.touch.size() == 1);
-  CHECK(block.touch[0].n->value[offset_in_block({-10, 0, 0})] == 2);
 }
 
 TEST_CASE("a batch of touches says and leaves what they say and leave one by one") {

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "io/simulation/furniture.h"
+#include "io/simulation/scene_library.h"
 #include "io/simulation/sequence_writer.h"
 #include "io/tables/confusion_file.h"
 

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "core/error.h"
+#include "io/simulation/scene_library.h"
 #include "io/simulation/touches.h"
 #include "io/tables/property_yaml.h"
 #include "tests/support/data.h"

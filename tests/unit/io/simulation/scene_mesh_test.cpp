@@ -5,6 +5,7 @@
 
 #include "io/simulation/convex_clip.h"
 #include "io/simulation/render_scene.h"
+#include "io/simulation/scene_library.h"
 #include "io/simulation/trajectory.h"
 #include "mapping/evaluation/mesh_distance.h"
 #include "tests/support/scenes.h"

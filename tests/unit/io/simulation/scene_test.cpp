@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "io/simulation/render_scene.h"
+#include "io/simulation/scene_library.h"
 #include "io/simulation/trajectory.h"
 #include "tests/support/scenes.h"
 
