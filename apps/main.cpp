@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/commands.h"
+#include "apps/commands/commands.h"
 #include "apps/exit_code.h"
 #include "core/error.h"
 #include "core/simd.h"

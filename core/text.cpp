@@ -1,6 +1,7 @@
 #include "core/text.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cstdio>
 #include <numeric>
 #include <utility>
@@ -10,6 +11,12 @@ namespace felt {
 std::string number_text(double value, const char* format) {
   std::string text(size_t(snprintf(nullptr, 0, format, value)), '\0');
   snprintf(text.data(), text.size() + 1, format, value);
+  return text;
+}
+
+std::string hexadecimal(uint64_t value) {
+  std::string text(16, '0');
+  for (size_t digit = text.size(); digit-- > 0; value >>= 4) text[digit] = "0123456789abcdef"[value & 15];
   return text;
 }
 
@@ -25,11 +32,15 @@ std::string nearest_word(const std::string& word, const std::vector<std::string>
     }
     return row.back();
   };
+  const auto folded = [](std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    return text;
+  };
   std::string best;
   size_t least = std::max<size_t>(2, word.size() / 2) + 1;
   if (word.size() > 64) return best;
   for (const std::string& candidate : known)
-    if (const size_t d = distance(word, candidate); d < least) least = d, best = candidate;
+    if (const size_t d = distance(folded(word), folded(candidate)); d < least) least = d, best = candidate;
   return best;
 }
 

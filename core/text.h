@@ -11,7 +11,11 @@ namespace felt {
 /// A number in printf's words; `format` takes one double.
 std::string number_text(double value, const char* format = "%g");
 
-/// The known word nearest to `word`: fewest insertions, deletions and replacements. Empty where none is near.
+/// All 16 hexadecimal digits of a number, in small letters.
+std::string hexadecimal(uint64_t value);
+
+/// The known word nearest to `word`: fewest insertions, deletions and replacements; the case of letters does not count.
+/// Empty where none is near.
 std::string nearest_word(const std::string& word, const std::vector<std::string>& known);
 
 /// The items with ", " between them, each as `text(item)` says it (a member will do: `&Property::name`); behind `most`

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/text.h"
+
 namespace felt {
 size_t active_voxel_count(const Map& map) {
   size_t n = 0;
@@ -73,10 +75,7 @@ std::string map_hash(const Map& map) {
   const std::string touches = journal_digest(map.touches);
   XXH3_128bits_update(&all, touches.data(), touches.size());
   const XXH128_hash_t h = XXH3_128bits_digest(&all);
-  char hex[33];
-  snprintf(hex, sizeof hex, "%016llx%016llx", static_cast<unsigned long long>(h.high64),
-           static_cast<unsigned long long>(h.low64));
-  return hex;
+  return hexadecimal(h.high64) + hexadecimal(h.low64);
 }
 
 float sample_tsdf(const Map& map, double x, double y, double z, float min_weight) {

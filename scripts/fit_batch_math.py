@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Coefficients of the polynomials in inference/batch_math-inl.h: weighted minimax fits (Remez exchange) at 40 digits.
+"""Coefficients of the polynomials in inference/batch/math-inl.h: weighted minimax fits (Remez exchange) at 40 digits.
 
     fit_batch_math.py            # prints each polynomial, lowest power first, with its weighted error
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/simd.h"
-#include "inference/batch_material.h"
-#include "inference/batch_mixture.h"
+#include "inference/batch/material.h"
+#include "inference/batch/mixture.h"
 #include "inference/material.h"
 #include "inference/mixture.h"
 

@@ -2,8 +2,9 @@
 
 #include <xxhash.h>
 
-#include <cstdio>
 #include <new>
+
+#include "core/text.h"
 
 namespace felt {
 
@@ -22,10 +23,7 @@ void ContentHash::add(std::string_view bytes) { XXH3_128bits_update(state_->xxh3
 
 std::string ContentHash::digits() const {
   const XXH128_hash_t hash = XXH3_128bits_digest(state_->xxh3.get());
-  char text[33];
-  std::snprintf(text, sizeof text, "%016llx%016llx", static_cast<unsigned long long>(hash.high64),
-                static_cast<unsigned long long>(hash.low64));
-  return text;
+  return hexadecimal(hash.high64) + hexadecimal(hash.low64);
 }
 
 std::string content_hash(std::string_view bytes) {

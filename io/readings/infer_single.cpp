@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "inference/batch_limits.h"
-#include "inference/batch_material.h"
-#include "inference/batch_mixture.h"
+#include "inference/batch/limits.h"
+#include "inference/batch/material.h"
+#include "inference/batch/mixture.h"
 #include "inference/dirichlet.h"
 
 namespace felt {

@@ -6,12 +6,12 @@
 
 namespace felt {
 
-/// One reading by the f32 batch kernel that a map runs (inference/batch_mixture.h), as a batch of one voxel whose
+/// One reading by the f32 batch kernel that a map runs (inference/batch/mixture.h), as a batch of one voxel whose
 /// locations are stored less those of the prior. `valid` false: the state was kept. Throws FormatError for numbers
 /// that the kernel refuses.
 MixtureUpdate mixture_update_f32(const InferRequest& request);
 
-/// Class posterior and view of exact readings by the f32 batch kernel (inference/batch_material.h).
+/// Class posterior and view of exact readings by the f32 batch kernel (inference/batch/material.h).
 struct MaterialView {
   std::vector<double> p;  ///< class probabilities
   double surprise = 0;

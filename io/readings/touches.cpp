@@ -32,7 +32,7 @@ public:
     // Columns of one's own are welcome, but a reading must not become exact for a slip of the pen.
     if (!has("sigma"))
       for (const std::string& name : names)
-        if (!nearest_word(name, {"sigma", "Sigma", "SIGMA"}).empty())
+        if (!nearest_word(name, {"sigma"}).empty())
           problems.push_back(describe_mismatch(where, "header", "'sigma'", "'" + name + "'"));
   }
   bool has(const std::string& name) const { return at_.contains(name); }

@@ -3,11 +3,12 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <climits>
 #include <cmath>
 #include <functional>
 #include <map>
-#include <ranges>
 #include <set>
+#include <utility>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -64,6 +65,17 @@ ReadValue whole_into(std::optional<int>& target, int least, int most) {
   };
 }
 
+ReadValue number_within_into(std::optional<double>& target, double least, double most) {
+  return [&target, least, most](const YAML::Node& value, const std::string& where) {
+    const std::string expected = "a number from " + number_text(least) + " to " + number_text(most);
+    const std::string text = text_of(value, where, expected);
+    const auto number = parse_number(text);
+    if (!number || !(*number >= least && *number <= most))
+      throw ConfigError(describe_mismatch(where, "value", expected, "'" + text + "'"));
+    target = number;
+  };
+}
+
 ReadValue flag_into(std::optional<bool>& target) {
   return [&target](const YAML::Node& value, const std::string& where) {
     bool flag = false;
@@ -77,7 +89,7 @@ ReadValue flag_into(std::optional<bool>& target) {
 template <typename T>
 ReadValue choice_into(std::optional<T>& target, const std::map<std::string, T>& choices) {
   return [&target, &choices](const YAML::Node& value, const std::string& where) {
-    const std::string expected = "one of " + listed(std::views::keys(choices));
+    const std::string expected = "one of " + listed(choices, &std::pair<const std::string, T>::first);
     const std::string text = text_of(value, where, expected);
     const auto found = choices.find(text);
     if (found == choices.end()) throw ConfigError(describe_mismatch(where, "value", expected, "'" + text + "'"));
@@ -178,6 +190,12 @@ std::map<std::string, ReadValue> readers_of(ReconstructConfig& c, const fs::path
                               const std::string& where) { read_names(c.label_settings.ignore_classes, value, where); }},
       {"instances", flag_into(c.label_settings.instances)},
       {"spread_rest", flag_into(c.label_settings.spread_rest)},
+      {"segmenter", path_into(c.perception.network, folder)},
+      {"top", whole_into(c.perception.top, 0, kMostTopClasses)},
+      {"vote", choice_into(c.perception.vote, kSegmentSourceNames)},
+      {"masks", path_into(c.perception.masks, folder)},
+      {"segment_color", number_within_into(c.perception.color_step, 0, kLargestColorStep)},
+      {"checkpoint", whole_into(c.checkpoint_every, 0, INT_MAX)},
       {"threads", whole_into(c.threads, 0, 1024)},
   };
 }

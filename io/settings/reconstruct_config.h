@@ -8,6 +8,7 @@
 
 #include "io/sequence/sequence_options.h"
 #include "io/settings/label_settings.h"
+#include "io/settings/perception_settings.h"
 #include "mapping/fusion/integration_config.h"
 
 namespace felt {
@@ -40,6 +41,8 @@ struct ReconstructConfig {
   std::optional<WeightModel> weight;
   std::optional<bool> carve;
   LabelSettings label_settings;
+  PerceptionSettings perception;
+  std::optional<int> checkpoint_every;  ///< frames; 0: only at the end
   std::optional<int> threads;
 };
 

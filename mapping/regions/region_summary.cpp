@@ -1,14 +1,14 @@
 #include <tbb/parallel_for.h>
-#include <cstdio>
-#include <limits>
-#include <string>
-#include <vector>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <span>
+#include <string>
+#include <vector>
 
+#include "core/text.h"
 #include "mapping/regions/region_query.h"
 #include "mapping/regions/region_surface.h"
 
@@ -123,11 +123,7 @@ Part examine(const Map& map, const Region& region, size_t b, const RegionSetting
   return part;
 }
 
-std::string percent(double fraction) {
-  char text[16];
-  snprintf(text, sizeof text, "%.0f %%", 100 * fraction);
-  return text;
-}
+std::string percent(double fraction) { return number_text(100 * fraction, "%.0f %%"); }
 
 }  // namespace
 

@@ -5,9 +5,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstdio>
 #include <tuple>
 #include <utility>
+
+#include "core/text.h"
 
 namespace felt {
 namespace {
@@ -112,11 +113,7 @@ TouchJournal joined(const TouchJournal& a, const TouchJournal& b) {
   return all;
 }
 
-std::string id_text(uint64_t id) {
-  char text[17];
-  snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(id));
-  return text;
-}
+std::string id_text(uint64_t id) { return hexadecimal(id); }
 
 uint64_t id_of_text(const std::string& text) {
   if (text.size() != 16 || text.find_first_not_of("0123456789abcdef") != std::string::npos)
@@ -130,7 +127,7 @@ std::string journal_digest(const TouchJournal& journal) {
   for (const Touch& touch : journal.touches)
     if (!touch.undone) digest << touch.id << touch.request << touch.region;
   const XXH128_hash_t h = digest.value();
-  return id_text(h.high64) + id_text(h.low64);
+  return hexadecimal(h.high64) + hexadecimal(h.low64);
 }
 
 }  // namespace felt

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "inference/batch_mixture.h"
+#include "inference/batch/mixture.h"
 
 namespace felt {
 namespace {

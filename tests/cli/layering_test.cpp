@@ -67,10 +67,12 @@ TEST_CASE("a module includes only itself and the modules below it") {
 
 TEST_CASE("a folder of a module includes only those before it") {
   const std::map<std::string, std::vector<std::string>> folders = {
+      {"inference", {"batch"}},
       {"mapping", {"store", "labels", "fusion", "regions", "touch", "surface", "grids", "maps", "evaluation"}},
       {"io",
-       {"files", "images", "tables", "meshes", "sequence", "settings", "segmentation", "pictures", "readings",
-        "map_file", "doctor", "simulation"}}};
+       {"files", "images", "tables", "meshes", "sequence", "segmentation", "settings", "pictures", "readings",
+        "map_file", "doctor", "simulation"}},
+      {"apps", {"options", "output", "fusion", "commands"}}};
   for (const auto& [module, order] : folders) {
     std::set<std::string> listed(order.begin(), order.end()), there;
     for (const auto& entry : fs::directory_iterator(felt::test::source_dir() / module))
@@ -83,6 +85,10 @@ TEST_CASE("a folder of a module includes only those before it") {
       }
   }
   CHECK(files_including("mapping/store", "^mapping/map") == kNone);  // which holds the store
+  for (const std::string& file : files_including("inference", "^inference/batch/")) {
+    INFO(file << ": the specification must not know the kernels that follow it");
+    CHECK(file.starts_with("inference/batch/"));
+  }
 }
 
 TEST_CASE("core and inference know neither OpenVDB nor OpenCV, and mapping does not know OpenCV") {

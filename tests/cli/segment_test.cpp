@@ -73,6 +73,30 @@ TEST_CASE("segment writes label images that reconstruct reads, and goes on where
   CHECK(a["bytes"]["classes"] > 0);
 }
 
+TEST_CASE("a configuration says what is made of colour, and the command line overrules it") {
+  const Setting setting;
+  std::ofstream(setting.folder.path() / "settings.yaml")
+      << "segmenter: " << setting.net.filename().string() << "\nclasses: colours.yaml\ntop: 3\nvote: geometric\n"
+      << "segment_color: 20\ncheckpoint: 2\n";
+  const auto reconstruct = [&](const std::string& name, const std::string& more) {
+    const CommandResult result = run_feltmap("reconstruct " + quoted(setting.sequence) +
+                                             " --frames 0:3 --voxel-size 0.05 --quiet --json --out " +
+                                             quoted(setting.folder.path() / name) + " " + more);
+    INFO(result.err);
+    REQUIRE(result.exit_code == 0);
+    return json::parse(result.out);
+  };
+  const std::string config = "--config " + quoted(setting.folder.path() / "settings.yaml");
+  const std::string network = "--segmenter " + quoted(setting.net) + " --classes " + quoted(setting.classes);
+  const json by_file = reconstruct("file", config);
+  const json by_line = reconstruct("line", network + " --top 3 --vote geometric --segment-color 20");
+  CHECK(by_file["map_hash"] == by_line["map_hash"]);
+  CHECK(by_file["config"]["perception"]["segment_color"] == 20);
+  const json overruled = reconstruct("both", config + " --top 0 --vote none");
+  CHECK(overruled["map_hash"] == reconstruct("labels", network)["map_hash"]);
+  CHECK(overruled["map_hash"] != by_file["map_hash"]);
+}
+
 TEST_CASE("segment does not mix images of different settings") {
   const Setting setting;
   REQUIRE(setting.segment("--frames 0:1").exit_code == 0);
@@ -126,8 +150,8 @@ TEST_CASE("options that would do nothing are refused") {
     CHECK_FALSE(fs::exists(setting.out));
   };
   const std::string scene = quoted(setting.sequence);
-  refused("reconstruct " + scene + " --top 3", "--top requires --segmenter");
-  refused("segment " + scene + " --vote geometric --top 3", "--top requires --net");
+  refused("reconstruct " + scene + " --top 3", "--top: network: expected one, by --segmenter, found none");
+  refused("segment " + scene + " --vote geometric --top 3", "--top: network: expected one, by --net, found none");
   refused("reconstruct " + scene + " --vote geometric --masks " + quoted(setting.folder.path()), "--masks");
   refused("segment " + scene + " --vote geometric --masks " + quoted(setting.folder.path()), "--masks");
 }

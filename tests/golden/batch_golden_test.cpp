@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "inference/batch_mixture.h"
+#include "inference/batch/mixture.h"
 #include "tests/support/inference_cases.h"
 #include "tests/support/mixture_states.h"
 #include "tests/support/simd_targets.h"

@@ -4,7 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "inference/batch_mixture.h"
+#include "inference/batch/mixture.h"
 #include "inference/nig.h"
 
 namespace felt::test {

@@ -45,9 +45,16 @@ TEST_CASE("a list says its items in other words, by a function or a member") {
         "1 a, 2 b");
 }
 
+TEST_CASE("a number in hexadecimal digits has all sixteen") {
+  CHECK(hexadecimal(0) == "0000000000000000");
+  CHECK(hexadecimal(0x0123456789abcdef) == "0123456789abcdef");
+  CHECK(hexadecimal(UINT64_MAX) == "ffffffffffffffff");
+}
+
 TEST_CASE("the nearest known word is suggested, and none where nothing is near") {
   CHECK(nearest_word("max_dpeth", {"max_depth", "min_depth", "max_dt"}) == "max_depth");
   CHECK(nearest_word("voxelsize", {"max_depth", "voxel_size"}) == "voxel_size");
+  CHECK(nearest_word("VOXEL_SIZE", {"max_depth", "voxel_size"}) == "voxel_size");
   CHECK(nearest_word("zzzz", {"max_depth", "voxel_size"}).empty());
 }
 

@@ -1,4 +1,4 @@
-#include "inference/batch_functions.h"
+#include "inference/batch/functions.h"
 
 #include <algorithm>
 #include <boost/math/special_functions/digamma.hpp>

@@ -1,4 +1,4 @@
-#include "inference/batch_material.h"
+#include "inference/batch/material.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>

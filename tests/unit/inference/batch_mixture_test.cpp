@@ -1,4 +1,4 @@
-#include "inference/batch_mixture.h"
+#include "inference/batch/mixture.h"
 
 #include <tbb/global_control.h>
 

@@ -17,7 +17,8 @@ TEST_CASE("a configuration sets what it names and leaves the rest open") {
       file,
       "voxel_size: 0.01\ntruncation: 4vox\nmax-depth: 3.5\nframes: 0:100:2\nintrinsics: [525, 525, 319.5, 239.5]\n"
       "weight: sensor-noise\ncarve: true\nthreads: 2\nclasses: classes.yaml\npose_convention: w2c,opengl\n"
-      "bgr: true\nlabel_offset: -1\nstamp-offset: -0.02\ndistortion: 0.1,0.01,0,0\nbody_camera: 1 2 3 0 0 0 1\n");
+      "bgr: true\nlabel_offset: -1\nstamp-offset: -0.02\ndistortion: 0.1,0.01,0,0\nbody_camera: 1 2 3 0 0 0 1\n"
+      "segmenter: classes.yaml\ntop: 3\nvote: geometric\nmasks: .\nsegment_color: 12.5\ncheckpoint: 100\n");
   const ReconstructConfig config = read_reconstruct_config(file);
   CHECK(config.voxel_size_m == 0.01);
   CHECK(parse_truncation(*config.truncation, *config.voxel_size_m, "truncation") == Approx(0.04));
@@ -32,6 +33,12 @@ TEST_CASE("a configuration sets what it names and leaves the rest open") {
   CHECK(config.bgr == true);
   CHECK(config.label_offset == -1);
   CHECK(config.stamp_offset == -0.02);
+  CHECK(config.perception.network == folder.path() / "classes.yaml");
+  CHECK(config.perception.top == 3);
+  CHECK(config.perception.vote == SegmentSource::geometric);
+  CHECK(config.perception.masks == folder.path() / ".");
+  CHECK(config.perception.color_step == 12.5);
+  CHECK(config.checkpoint_every == 100);
   REQUIRE(config.distortion);
   CHECK(config.distortion->k1 == 0.1);
   REQUIRE(config.T_body_camera);
@@ -47,18 +54,34 @@ TEST_CASE("every problem of a configuration is reported at once with its line an
   write_text(
       file,
       "voxel_size: 0\nvoxelsize: 1\ntruncation: wide\nmax_depth: [1, 2]\nframes: 5\nweight: heavy\ncarve: maybe\n"
-      "threads: -1\nlabels: nowhere\nmax_dt: 0,02\nmax_depth: 3\nintrinsics: [1, 2]\n");
+      "threads: -1\nlabels: nowhere\nmax_dt: 0,02\nmax_depth: 3\nintrinsics: [1, 2]\n"
+      "top: 65\nvote: loud\nsegment_color: 451\nsegmenter: nowhere\ncheckpoint: -1\n");
   try {
     read_reconstruct_config(file);
     FAIL("was accepted");
   } catch (const ConfigError& fault) {
     const std::string text = fault.what();
     INFO(text);
-    for (const char* part :
-         {"config.yaml:1: voxel_size", "config.yaml:2: key: expected 'voxel_size', found 'voxelsize'",
-          "config.yaml:3: truncation", "config.yaml:4: max_depth", "config.yaml:5: frames", "config.yaml:6: weight",
-          "inverse-square", "config.yaml:7: carve", "config.yaml:8: threads", "config.yaml:9: labels",
-          "config.yaml:10: max_dt", "config.yaml:11: key: expected each once", "config.yaml:12: intrinsics"})
+    for (const char* part : {"config.yaml:1: voxel_size",
+                             "config.yaml:2: key: expected 'voxel_size', found 'voxelsize'",
+                             "config.yaml:3: truncation",
+                             "config.yaml:4: max_depth",
+                             "config.yaml:5: frames",
+                             "config.yaml:6: weight",
+                             "inverse-square",
+                             "config.yaml:7: carve",
+                             "config.yaml:8: threads",
+                             "config.yaml:9: labels",
+                             "config.yaml:10: max_dt",
+                             "config.yaml:11: key: expected each once",
+                             "config.yaml:12: intrinsics",
+                             "config.yaml:13: top",
+                             "config.yaml:14: vote",
+                             "geometric, instances, none",
+                             "config.yaml:15: segment_color",
+                             "from 0 to 450",
+                             "config.yaml:16: segmenter",
+                             "config.yaml:17: checkpoint"})
       CHECK_THAT(text, Catch::Contains(part));
   }
 }

@@ -210,7 +210,7 @@ TEST_CASE("each voxel of a mixture region has the scalar update of its own state
       for (const EvidencePlane& e : map.store.get(block.coord)->evidence) a[e.slot] += double(e.counts->value[offset]);
       const MixtureUpdate once = mixture_update(a, priors, 0.25), twice = mixture_update(once.a, once.nig, 0.41);
       for (size_t c = 0; c < 8; ++c) {
-        // The kernel's own bounds (inference/batch_mixture.h) for two readings; the log evidences stay below 20.
+        // The kernel's own bounds (inference/batch/mixture.h) for two readings; the log evidences stay below 20.
         const Nig nig = state.nig(block, block.properties[0], c, i), &exact = twice.nig[c];
         REQUIRE(block.a[c * m + i] == Approx(twice.a[c]).epsilon(4e-5));
         REQUIRE(std::abs(nig.tau - exact.tau) < 6e-5 * std::sqrt(plug_in_variance(exact)));

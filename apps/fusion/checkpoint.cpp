@@ -1,0 +1,150 @@
+#include "apps/fusion/checkpoint.h"
+
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+#include "apps/options/problems.h"
+#include "core/error.h"
+#include "io/files/json_number.h"
+#include "io/files/json_text.h"
+#include "io/map_file/map_file.h"
+
+namespace felt::apps {
+namespace {
+
+using nlohmann::json;
+
+// Keys of Map::metadata.
+constexpr const char* kConfig = "config";
+constexpr const char* kProgress = "progress";
+
+/// Twelve numbers a pose, row by row: JSON keeps every bit of them.
+json poses_json(const std::vector<Eigen::Isometry3d>& poses) {
+  json rows = json::array();
+  for (const Eigen::Isometry3d& pose : poses) {
+    json row = json::array();
+    for (int i = 0; i < 12; ++i) row.push_back(pose.matrix()(i / 4, i % 4));
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+std::vector<Eigen::Isometry3d> poses_of(const json& rows) {
+  std::vector<Eigen::Isometry3d> poses;
+  for (const json& row : rows) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    for (int i = 0; i < 12; ++i) pose.matrix()(i / 4, i % 4) = row.at(size_t(i)).get<double>();
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+json progress_of(const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints, bool complete,
+                 const std::string& touches, const std::string& recording) {
+  json unknown = json::array();
+  for (const auto& [id, pixels] : record.unknown_ids) unknown.push_back({id, pixels});
+  return {{"recording", recording},
+          {"complete", complete},
+          {"read", record.read},
+          {"fused", record.fused},
+          {"skipped", record.skipped},
+          {"label_voxels", {record.labels.voxels, record.labels.unknown, record.labels.invalid}},
+          {"unknown_ids", unknown},
+          {"ignored_pixels", record.ignored_pixels},
+          {"without_labels", record.without_labels},
+          {"touches", touches},
+          {"viewpoints", poses_json(viewpoints)}};
+}
+
+json text_of(const Map& map, const char* key, const std::string& where) {
+  const auto found = map.metadata.find(key);
+  const json text = found == map.metadata.end() ? json() : json::parse(found->second, nullptr, false);
+  if (text.is_object()) return text;
+  std::string instead = "something else";
+  if (map.metadata.contains(std::string(key) + " 1"))  // as merge numbers them
+    instead = "those of several runs: a merged map cannot be continued";
+  else if (found == map.metadata.end())
+    instead = "none: not a map that can be continued";
+  throw FormatError(
+      describe_mismatch(where, std::string("text '") + key + "'", "that of a map of reconstruct", instead));
+}
+
+void read_progress(const json& progress, const std::string& where, Checkpoint& checkpoint) {
+  try {
+    FusionRecord& record = checkpoint.record;
+    record.read = whole_number<int64_t>(progress.at("read"));
+    record.fused = whole_number<int64_t>(progress.at("fused"));
+    progress.at("skipped").get_to(record.skipped);
+    const json& labels = progress.at("label_voxels");
+    record.labels = {whole_number<uint64_t>(labels.at(0)), whole_number<uint64_t>(labels.at(1)),
+                     whole_number<uint64_t>(labels.at(2))};
+    for (const json& row : progress.at("unknown_ids"))
+      record.unknown_ids[whole_number<uint16_t>(row.at(0))] = whole_number<uint64_t>(row.at(1));
+    progress.at("ignored_pixels").get_to(record.ignored_pixels);
+    record.without_labels = progress.value("without_labels", int64_t{0});
+    checkpoint.viewpoints = poses_of(progress.at("viewpoints"));
+    progress.at("complete").get_to(checkpoint.complete);
+    checkpoint.touches = progress.value("touches", "");
+  } catch (const std::exception& fault) {
+    throw FormatError(describe_mismatch(where, "text 'progress'", "what reconstruct counts", fault.what()));
+  }
+}
+
+void require_same_recording(const json& progress, const Map& map, const SequenceInfo& now, const std::string& where) {
+  if (progress.value("recording", json()) == now.content) return;
+  const bool same_beginning = !map.frames.runs.empty() && map.frames.runs.back().sequence == now.fingerprint;
+  throw ConfigError(describe_mismatch(
+      "--resume", "recording", "the one that " + where + " was made of",
+      same_beginning ? "that one, but it has grown or changed since (fuse its new frames with --frames into another "
+                       "folder and join both with feltmap merge, or begin again: --force instead of --resume)"
+                     : "another"));
+}
+
+/// The path of a recording may be spelled in another way: its content is compared instead.
+void require_same_run(const json& then, const json& now, const std::string& where) {
+  std::set<std::string> keys;
+  for (const json* config : {&then, &now})
+    for (const auto& [key, value] : config->items()) keys.insert(key);
+  keys.erase("sequence");
+  Problems problems;
+  for (const std::string& key : keys)
+    if (const json was = then.value(key, json()), is = now.value(key, json()); was != is)
+      problems.add(describe_mismatch("--resume", key, json_text(was) + " as in " + where, json_text(is)));
+  problems.throw_if_any();
+}
+
+}  // namespace
+
+std::string fusion_settings(const nlohmann::ordered_json& config) {
+  nlohmann::ordered_json shaping = config;
+  for (const char* key : {"sequence", "frames", "labels", "probs", "classes", "properties", "touches"})
+    shaping.erase(key);
+  return json_text(shaping);
+}
+
+std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
+                            bool complete, const std::string& touches, const std::string& recording,
+                            const nlohmann::ordered_json& config, const std::filesystem::path& path) {
+  map.metadata[kConfig] = json_text(config);
+  map.metadata[kProgress] = json_text(progress_of(record, viewpoints, complete, touches, recording));
+  // On the way nobody looks at views, and they take longer than the rest.
+  return save_map(map, path, {.views = complete || !record.stopped.empty()});
+}
+
+void forget_progress(Map& map) { map.metadata.erase(kProgress); }
+
+std::optional<Checkpoint> resume(const std::filesystem::path& path, const SequenceInfo& sequence,
+                                 const nlohmann::ordered_json& config) {
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  Map map = load_map(path);
+  const std::string where = path.string();
+  const json progress = text_of(map, kProgress, where);
+  require_same_recording(progress, map, sequence, where);
+  require_same_run(text_of(map, kConfig, where), json::parse(json_text(config)), where);
+  Checkpoint checkpoint{std::move(map), {}, {}, false, {}};
+  read_progress(progress, where, checkpoint);
+  return checkpoint;
+}
+
+}  // namespace felt::apps

@@ -1,0 +1,72 @@
+#include "apps/options/perception_options.h"
+
+#include <nlohmann/json.hpp>
+
+#include "apps/command.h"
+#include "apps/options/number_checks.h"
+#include "core/error.h"
+#include "core/text.h"
+#include "io/files/content_hash.h"
+#include "io/files/text_input.h"
+
+namespace felt::apps {
+
+void add_perception_options(CLI::App& command, PerceptionSettings& settings, const std::string& net_option) {
+  const Perception standard;
+  const char* group = "Perception";
+  command
+      .add_option(net_option, settings.network,
+                  "Segment the colour images with the network that this file describes (net.yaml)")
+      ->option_text("FILE")
+      ->group(group);
+  command
+      .add_option("--top", settings.top,
+                  "Probabilities of a pixel's m likeliest classes instead of its label [0: label]")
+      ->check(CLI::Range(0, kMostTopClasses))
+      ->group(group);
+  add_choice(command, "--vote", settings.vote, kSegmentSourceNames,
+             "Give the pixels of a segment one class: geometric (from depth), instances (images or masks), or none")
+      ->default_str(name_of(kSegmentSourceNames, standard.vote))
+      ->group(group);
+  command.add_option("--masks", settings.masks, "Folder of instance images, or of a folder of masks for each frame")
+      ->group(group);
+  command
+      .add_option("--segment-color", settings.color_step,
+                  "Geometric segments also end where colour steps by this, grey levels; 0: colour does not matter")
+      ->default_str(number_text(standard.segments.color_step))
+      ->check(finite())
+      ->check(CLI::Range(0.0, kLargestColorStep))
+      ->group(group);
+}
+
+void check(const PerceptionSettings& settings, const std::string& net_option, Problems& problems) {
+  if (settings.top.value_or(0) > 0 && settings.network.empty())
+    problems.add_of_usage(describe_mismatch("--top", "network", "one, by " + net_option, "none"));
+}
+
+Perception perception_of(const PerceptionSettings& settings, const ClassTable& classes) {
+  Perception perception;
+  perception.top = settings.top.value_or(perception.top);
+  perception.vote = settings.vote.value_or(perception.vote);
+  perception.segments.color_step = settings.color_step.value_or(perception.segments.color_step);
+  if (!settings.network.empty())
+    perception.segmenter = std::make_shared<const Segmenter>(read_net_description(settings.network), classes);
+  return perception;
+}
+
+nlohmann::ordered_json to_json(const PerceptionSettings& settings) {
+  const Perception standard;
+  nlohmann::ordered_json json;
+  if (!settings.network.empty()) {
+    json["segmenter"] = settings.network.string();
+    json["segmenter_content"] = content_hash(read_whole_file(settings.network));
+  }
+  json["top"] = settings.top.value_or(standard.top);
+  json["vote"] = name_of(kSegmentSourceNames, settings.vote.value_or(standard.vote));
+  if (!settings.masks.empty()) json["masks"] = settings.masks.string();
+  if (settings.votes_by(SegmentSource::geometric))
+    json["segment_color"] = settings.color_step.value_or(standard.segments.color_step);
+  return json;
+}
+
+}  // namespace felt::apps

@@ -1,0 +1,148 @@
+#include "apps/output/output_files.h"
+
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <iterator>
+#include <limits>
+#include <set>
+
+#include "core/error.h"
+#include "core/text.h"
+#include "io/files/atomic_file.h"
+#include "io/map_file/map_file.h"
+#include "mapping/grids/leaf_mask.h"
+#include "mapping/maps/table_difference.h"
+
+namespace felt::apps {
+namespace fs = std::filesystem;
+namespace {
+
+/// Frames of a run that the journal does not hold with the same settings.
+size_t frames_missing_from(const FrameJournal& journal, const FusedFrames& run) {
+  std::set<int64_t> missing(run.frames.begin(), run.frames.end());
+  for (const FusedFrames& other : journal.runs)
+    if (other.sequence == run.sequence && other.settings == run.settings)
+      for (const int64_t frame : other.frames) missing.erase(frame);
+  return missing.size();
+}
+
+/// Observed voxels of an older map that are not observed in the new one.
+size_t voxels_missing_from(const Map& map, const Map& older) {
+  size_t missing = 0;
+  for (const Block& block : older.store.blocks()) {
+    const Block* kept = map.store.get(block.coord);
+    missing += size_t((observed_voxels(block) - (kept ? observed_voxels(*kept) : BlockMask{})).count());
+  }
+  return missing;
+}
+
+/// Touches of an older map that count, and in the new one do not (`undone_too`) or are not known at all.
+size_t touches_missing_from(const TouchJournal& journal, const TouchJournal& older, bool undone_too) {
+  return size_t(std::count_if(older.touches.begin(), older.touches.end(), [&](const Touch& touch) {
+    const Touch* kept = journal.find(touch.id);
+    return !touch.undone && (kept == nullptr || (undone_too && kept->undone));
+  }));
+}
+
+/// What an older map holds that the new one does not, in words; empty where there is nothing.
+std::string missing_from(const Map& map, const Map& older, LostTouches touches) {
+  if (older.voxel_size_m != map.voxel_size_m) return "a map of " + std::to_string(older.voxel_size_m) + " m voxels";
+  if (!older.classes.empty() && !(older.classes == map.classes)) return "a map of other classes";
+  if (!continues(map.properties, older.properties)) return "a map of other properties";
+  if (older.frames.runs.empty() && !map.frames.runs.empty()) return "a map that does not say of what it was made";
+  size_t lost_frames = 0;
+  for (const FusedFrames& run : older.frames.runs) lost_frames += frames_missing_from(map.frames, run);
+  const size_t lost_touches =
+      touches == LostTouches::refuse ? touches_missing_from(map.touches, older.touches, true) : 0;
+  if (lost_frames > 0 || lost_touches > 0)
+    return "a map with " + std::to_string(lost_frames) + " frames and " + std::to_string(lost_touches) +
+           " touches that the new one does not hold";
+  // A part that was cut out has the whole journal of frames.
+  if (const size_t voxels = voxels_missing_from(map, older); voxels > 0)
+    return "a map with " + std::to_string(voxels) + " observed voxels that the new one does not hold";
+  return "";
+}
+
+}  // namespace
+
+void prepare_output_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!fs::is_directory(folder))
+    throw IoError(describe_mismatch(folder.string(), "output folder", "a folder that exists or can be made",
+                                    error ? error.message() : "something that is no folder"));
+  if (access(folder.c_str(), W_OK | X_OK) != 0)
+    throw IoError(
+        describe_mismatch(folder.string(), "output folder", "a folder that can be written", std::strerror(errno)));
+}
+
+void require_no_files(const fs::path& folder, const std::vector<std::string>& names, bool overwrite) {
+  std::vector<std::string> in_the_way;
+  std::ranges::copy_if(names, std::back_inserter(in_the_way),
+                       [&](const auto& name) { return fs::exists(folder / name); });
+  if (!in_the_way.empty() && !overwrite)
+    throw IoError(describe_mismatch(folder.string(), "output exists", "no result there, or --force to replace it",
+                                    listed(in_the_way)));
+  for (const std::string& name : names) remove_abandoned_parts(folder / name);
+}
+
+void require_no_file(const fs::path& file, bool overwrite) {
+  if (!overwrite && fs::exists(file))
+    throw IoError(describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", "one"));
+}
+
+void require_writable(const fs::path& file, bool overwrite) {
+  if (!overwrite && fs::is_regular_file(file) && access(file.c_str(), W_OK) != 0)
+    throw IoError(describe_mismatch(file.string(), "output exists", "a file that may be written, or --force",
+                                    std::strerror(errno)));
+}
+
+void require_nothing_lost(const fs::path& file, const Map& replacement, LostTouches touches, bool overwrite) {
+  if (overwrite || !fs::is_regular_file(file)) return;
+  std::string lost;
+  size_t forgotten_touches = 0;
+  try {
+    const Map older = load_map(file);
+    lost = missing_from(replacement, older, touches);
+    forgotten_touches = touches_missing_from(replacement.touches, older.touches, false);
+  } catch (const Error&) {
+    lost = "a file that is no map that can be read";
+  }
+  if (!lost.empty())
+    throw IoError(describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", lost));
+  if (forgotten_touches > 0)
+    spdlog::warn("{}: {} touches that count there are not in the map that replaces it", file.string(),
+                 forgotten_touches);
+}
+
+void require_ending(const fs::path& file, const std::string& ending) {
+  if (file.extension() != ending && fs::is_regular_file(file))
+    throw ConfigError(describe_mismatch(file.string(), "output exists", "a name that ends with " + ending,
+                                        "another file, which would be replaced"));
+}
+
+void warn_if_coarse(const TriangleMesh& mesh, const fs::path& file) {
+  float farthest = 0;
+  for (const Eigen::Vector3f& p : mesh.positions) farthest = std::max(farthest, p.cwiseAbs().maxCoeff());
+  const float step_m = std::nextafter(farthest, std::numeric_limits<float>::infinity()) - farthest;
+  constexpr float kMillimetre = 0.001f;
+  if (step_m > kMillimetre)
+    spdlog::warn(
+        "{}: coordinates up to {:.0f} m are kept to {:.3g} m in the 32-bit floats of meshes; the map itself is exact. "
+        "Subtract an offset from the poses for a mesh that is, too",
+        file.string(), farthest, step_m);
+}
+
+MapWriting::MapWriting(const fs::path& file, bool overwrite)
+    : folder_(file.has_parent_path() ? file.parent_path() : fs::path("."), FileLock::Kind::shared, 1),
+      file_(file, FileLock::Kind::exclusive, 60) {
+  require_writable(file, overwrite);
+  remove_abandoned_parts(file);
+}
+
+}  // namespace felt::apps
