@@ -24,9 +24,10 @@ int run(const Options& options) {
     std::printf("%s\n", to_json(d, options.a, options.b, options.tolerance).c_str());
   } else if (!options.common.quiet) {
     std::printf("%s%s\n", to_text(d).c_str(),
-                differs       ? "different"
-                : d.same_hash ? "identical"
-                              : "equal within tolerance");
+                differs              ? "different"
+                : !d.same_hash       ? "equal within tolerance"
+                : d.settings.empty() ? "identical"
+                                     : "identical values");
   }
   return differs ? kDifferent : kDone;
 }

@@ -38,6 +38,7 @@ struct ExportOptions : CommonOptions {
   std::vector<std::string> grids;
   bool half = false, compact = false, overwrite = false;
   RegionOptions segment;
+  CLI::Option *color_by_option = nullptr, *up_option = nullptr;
 };
 
 void check(const ExportOptions& o) {
@@ -45,7 +46,13 @@ void check(const ExportOptions& o) {
     throw CLI::RequiredError("--vdb, --mesh, --points or --html");
   Problems problems;
   if (o.vdb.empty() && (o.half || o.compact || !o.grids.empty()))
-    problems.add(describe_mismatch("--grids, --half, --compact", "what to write", "--vdb FILE", "no --vdb"));
+    problems.add_of_usage(describe_mismatch("--grids, --half, --compact", "what to write", "--vdb FILE", "no --vdb"));
+  if (o.mesh.empty() && o.points.empty() && o.html.empty() && o.color_by_option->count() > 0)
+    problems.add_of_usage(describe_mismatch("--color-by", "what to write", "--mesh, --points or --html", "none"));
+  if (o.html.empty() && o.up_option->count() > 0)
+    problems.add_of_usage(describe_mismatch("--up", "what to write", "--html FILE", "no --html"));
+  for (const fs::path& file : {o.mesh, o.points})
+    if (!file.empty()) problems.attempt([&] { require_mesh_name(file); });
   if (o.compact && (o.half || !o.grids.empty()))
     problems.add(describe_mismatch("--compact", "a map file", "neither --grids nor --half", "one of them"));
   if (!o.box_m.empty() && !(o.box_m[0] < o.box_m[3] && o.box_m[1] < o.box_m[4] && o.box_m[2] < o.box_m[5]))
@@ -61,8 +68,12 @@ void check(const ExportOptions& o) {
       if (const auto [other, is_new] = uses.emplace(fs::weakly_canonical(file), option); !is_new)
         problems.add(describe_mismatch(option, "file", "another one than " + other->second, file.string()));
   problems.throw_if_any();
-  for (const fs::path& file : {o.vdb, o.mesh, o.points, o.html})
-    if (!file.empty()) require_no_file(file, o.overwrite);
+  for (const fs::path& file : {o.vdb, o.mesh, o.points, o.html}) {
+    if (file.empty()) continue;
+    require_no_file(file, o.overwrite);
+    if (file.has_parent_path() && !fs::is_directory(file.parent_path()))
+      throw IoError(describe_mismatch(file.string(), "folder to write to", "one that exists", "none"));
+  }
 }
 
 int slot_of_class(const Map& map, const ExportOptions& o) {
@@ -100,6 +111,14 @@ Part part_of_map(const Map& map, const ExportOptions& o) {
   return part;
 }
 
+/// The surface may lie in a box, and no centre of a voxel.
+bool reaches(const Map& map, const Part& part) {
+  if (!part.box_m) return part.voxels->voxels() > 0;
+  const Eigen::Vector3d voxel = Eigen::Vector3d::Constant(map.voxel_size_m);
+  const Region near = voxels_in(map, {part.box_m->min() - voxel, part.box_m->max() + voxel});
+  return (part.things ? intersected(*part.things, near) : near).voxels() > 0;
+}
+
 json write_vdb(const Map& map, const Region* part, const ExportOptions& o) {
   json written = {{"path", o.vdb.string()}};
   if (o.grids.empty() && !o.half) {
@@ -127,8 +146,7 @@ void warn_if_empty(const fs::path& file, size_t count, const char* what) {
     spdlog::warn("{}: empty: no {} of the surface lies in what was asked for", file.string(), what);
 }
 
-json write_surface(const Map& map, const Part& part, const ExportOptions& o) {
-  const SurfaceColor color = parse_surface_color(o.color_by, map);
+json write_surface(const Map& map, const Part& part, const SurfaceColor& color, const ExportOptions& o) {
   std::vector<VertexEdge> edges;
   TriangleMesh mesh = extract_mesh(map, {}, &edges);
   attach_beliefs(map, edges, mesh);
@@ -175,12 +193,13 @@ int run(const ExportOptions& o) {
   }
   Map map = load_map(o.map);
   use_properties(map, o.properties);
+  const SurfaceColor color = parse_surface_color(o.color_by, map);
   const Part part = part_of_map(map, o);
-  if (part.voxels && part.voxels->voxels() == 0)
+  if (part.voxels && (o.vdb.empty() ? !reaches(map, part) : part.voxels->voxels() == 0))
     throw ConfigError(describe_mismatch(o.map.string(), "part to export", "at least one voxel of the map", "none"));
   json written = json::object();
   if (!o.vdb.empty()) written["vdb"] = write_vdb(map, part.voxels ? &*part.voxels : nullptr, o);
-  if (!o.mesh.empty() || !o.points.empty() || !o.html.empty()) written.update(write_surface(map, part, o));
+  if (!o.mesh.empty() || !o.points.empty() || !o.html.empty()) written.update(write_surface(map, part, color, o));
   if (o.json) {
     print_json(written);
   } else if (!o.quiet) {
@@ -212,17 +231,19 @@ void add_export(CLI::App& app) {
   command.add_option("--mesh", o->mesh, "Surface mesh, by extension: .ply, .glb or .obj");
   command.add_option("--points", o->points, "The mesh's vertices with normals and colours: .ply");
   command.add_option("--html", o->html, "A page that shows the mesh in a browser, without a network");
-  command.add_option("--up", o->up, "Axis of the map that points up on that page at first: +x, -x, +y, ... -z")
-      ->check(CLI::IsMember({"+x", "-x", "+y", "-y", "+z", "-z"}))
-      ->capture_default_str();
+  o->up_option =
+      command.add_option("--up", o->up, "Axis of the map that points up on that page at first: +x, -x, +y, ... -z")
+          ->check(CLI::IsMember({"+x", "-x", "+y", "-y", "+z", "-z"}))
+          ->capture_default_str();
   command.add_option("--vdb", o->vdb, "Map file of the part; with --grids or --half a file of grids for viewing");
   command.add_option("--grids", o->grids, "Grids to write, by name; evidence/ stands for all that begin so")
       ->delimiter(',')
       ->option_text("NAME,...");
   command.add_flag("--half", o->half, "Store floats in 16 bits, but for grids that these cannot hold");
   command.add_flag("--compact", o->compact, "A map file of least size: DEFLATE, and no grids that only viewers need");
-  command.add_option("--color-by", o->color_by, "rgb, class, entropy, <property>.mean or <property>.sd")
-      ->capture_default_str();
+  o->color_by_option =
+      command.add_option("--color-by", o->color_by, "rgb, class, entropy, <property>.mean or <property>.sd")
+          ->capture_default_str();
   command.add_option("--properties", o->properties, "Property table (YAML), instead of the one that the map may have");
   const char* part = "Part (several: what they have in common)";
   command.add_option("--class", o->class_name, "Only where this is the most probable class")->group(part);

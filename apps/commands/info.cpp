@@ -3,14 +3,17 @@
 #include <cstdio>
 #include <limits>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <string>
 #include <type_traits>
 #include <vector>
 
 #include "apps/command.h"
 #include "apps/commands/commands.h"
 #include "apps/exit_code.h"
+#include "apps/options/problems.h"
 #include "apps/options/reading_options.h"
 #include "apps/output/belief_report.h"
 #include "core/error.h"
@@ -242,18 +245,37 @@ void write_pictures(const fs::path& path, const SequenceOptions& options, const 
   write_png(folder / "trajectory.png", trajectory_picture(list_sequence(path, options)));
 }
 
-int run(const fs::path& path, const ReadingArguments& reading, bool with_grids, const fs::path& pictures,
-        const CommonOptions& common) {
+struct InfoOptions {
+  fs::path path, pictures;
+  ReadingArguments reading;
+  std::vector<std::string> reading_given;  ///< options that say how to read a sequence
+  bool grids = false;
+  CommonOptions common;
+};
+
+/// What a map is not asked, and a sequence.
+void check(const InfoOptions& o, bool is_map) {
+  Problems problems;
+  const auto expect = [&](bool good, const std::string& option, const char* expected) {
+    if (!good) problems.add_of_usage(describe_mismatch(option, "what to describe", expected, o.path.string()));
+  };
+  expect(!is_map || o.pictures.empty(), "--pictures", "a sequence");
+  for (const std::string& option : o.reading_given) expect(!is_map, option, "a sequence");
+  expect(is_map || !o.grids, "--grids", "a map");
+  problems.throw_if_any();
+}
+
+int run(const InfoOptions& o) {
+  const fs::path& path = o.path;
   if (!fs::exists(path))
     throw IoError(describe_mismatch(path.string(), "what to describe", "a map file or a sequence", "nothing there"));
   // Sequences are folders, but for containers and single scans.
   const bool is_map = fs::is_regular_file(path) && path.extension() != ".sens" && path.extension() != ".bin";
-  if (is_map && !pictures.empty())
-    throw ConfigError(describe_mismatch("--pictures", "what to describe", "a sequence", path.string()));
-  const SequenceOptions options = resolve(reading);
-  Json json = is_map ? describe_map(path, with_grids) : describe_sequence(path, options);
-  if (!pictures.empty()) write_pictures(path, options, pictures);
-  if (common.json) {
+  check(o, is_map);
+  const SequenceOptions options = resolve(o.reading);
+  Json json = is_map ? describe_map(path, o.grids) : describe_sequence(path, options);
+  if (!o.pictures.empty()) write_pictures(path, options, o.pictures);
+  if (o.common.json) {
     print_json(json);
   } else {
     if (is_map) {
@@ -268,24 +290,21 @@ int run(const fs::path& path, const ReadingArguments& reading, bool with_grids, 
 }  // namespace
 
 void add_info(CLI::App& app) {
-  struct Arguments {
-    fs::path path;
-    ReadingArguments reading;
-    fs::path pictures;
-    bool grids = false;
-    CommonOptions common;
-  };
-  auto a = std::make_shared<Arguments>();
-  CLI::App& command =
-      add_command(app,
-                  {"info", "Say what a map or a sequence holds",
-                   "feltmap info result/map.vdb\nfeltmap info recording --json --pictures looks"},
-                  a->common, [a] { return run(a->path, a->reading, a->grids, a->pictures, a->common); });
-  command.add_option("PATH", a->path, "A map file, or a folder (or .sens file) of a recorded sequence")->required();
-  command.add_flag("--grids", a->grids,
+  auto o = std::make_shared<InfoOptions>();
+  CLI::App& command = add_command(app,
+                                  {"info", "Say what a map or a sequence holds",
+                                   "feltmap info result/map.vdb\nfeltmap info recording --json --pictures looks"},
+                                  o->common, [o, &app] {
+                                    for (const CLI::Option* option : app.get_subcommand("info")->get_options())
+                                      if (option->get_group() == kReadingGroup && option->count() > 0)
+                                        o->reading_given.push_back(option->get_name());
+                                    return run(*o);
+                                  });
+  command.add_option("PATH", o->path, "A map file, or a folder (or .sens file) of a recorded sequence")->required();
+  command.add_flag("--grids", o->grids,
                    "Of a map also every grid: active voxels, least, greatest and mean value; voxels of each class");
-  command.add_option("--pictures", a->pictures, "Folder for thumbnails.png and trajectory.png of a sequence");
-  add_reading_options(command, a->reading);
+  command.add_option("--pictures", o->pictures, "Folder for thumbnails.png and trajectory.png of a sequence");
+  add_reading_options(command, o->reading);
 }
 
 }  // namespace felt::apps

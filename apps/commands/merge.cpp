@@ -13,6 +13,7 @@
 #include "apps/command.h"
 #include "apps/commands/commands.h"
 #include "apps/exit_code.h"
+#include "apps/fusion/checkpoint.h"
 #include "apps/options/number_checks.h"
 #include "apps/options/run_settings.h"
 #include "apps/output/output_files.h"
@@ -95,7 +96,8 @@ int run(const Options& options) {
   merging.max_evidence = cap(options.max_evidence, maps, has_evidence, "label_cap", "cap of class evidence",
                              "--label-cap", merging.max_evidence);
   warn_of_what_does_not_add(maps, merging);
-  const Map result = merge(pointers, merging);
+  Map result = merge(pointers, merging);
+  forget_progress(result);
   if (!writing) writing.emplace(options.out, options.overwrite);
   require_nothing_lost(options.out, result, LostTouches::refuse, options.overwrite);
   const double merge_s = joining.seconds();

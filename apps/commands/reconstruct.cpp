@@ -297,6 +297,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
       complete = earlier->complete;
       touches_done = std::move(earlier->touches);
     }
+  const bool was_complete = complete;
   const auto save = [&] {
     return save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, touches_done,
                            sequence->info().content, config, options.out / kMapName);
@@ -352,9 +353,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
   else if (!common.quiet)
     print_summary(report, touched, options.out);
   print_left_out(touches, touched);
-  if (!touches.file.empty() && report.resumed_after > 0 && touched.empty() && touches_done.empty())
-    spdlog::warn("{}: not applied, as the map was complete before: feltmap touch MAP --file does it",
-                 touches.file.string());
+  if (was_complete) warn_if_changed(touches, touches_done);
   const FusionRecord& fusion = report.fusion;
   if (fusion.stopped.empty()) return kDone;
   std::fprintf(stderr,

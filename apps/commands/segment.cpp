@@ -123,16 +123,13 @@ SegmentRecord segment_frames(const SequenceReader& sequence, const Perception& p
   return record;
 }
 
-int run_segment(const SegmentOptions& options) {
+int run_segment(SegmentOptions& options) {
   const Stopwatch watch;
   const bool by_instances = options.perception.votes_by(SegmentSource::instances);
   Problems problems;
   if (!options.perception.active())
     problems.add_of_usage(describe_mismatch("segment", "--net or --vote", "what makes or changes labels", "neither"));
-  if (!options.perception.masks.empty() && !by_instances)
-    problems.add_of_usage(
-        describe_mismatch("segment", "--masks", "--vote instances, which they are for", "without it"));
-  check(options.perception, "--net", problems);
+  require_use(options.perception, {options.perception, "--net", "--vote instances", ""}, false, problems);
   problems.throw_if_any();
   ReadingArguments arguments;
   arguments.format = options.format, arguments.frames = options.frames;

@@ -328,6 +328,9 @@ void add_touch(CLI::App& app) {
   std::vector<CLI::Option*> of_a_reading = options->region.add_to(command);
   of_a_reading.insert(of_a_reading.end(),
                       {property, value, sequence, pixel, masks, sigma, stamp, model, projection, rho, properties});
+  // Their regions are segments of the recording's own frames.
+  for (const char* of_another_view : {"--mask", "--intrinsics", "--pose"})
+    for (CLI::Option* of_a_recording : {file, frame}) of_a_recording->excludes(command.get_option(of_another_view));
   for (CLI::Option* of_the_journal : {undo, redo, list})
     for (CLI::Option* option : of_a_reading) of_the_journal->excludes(option);
   list->excludes(out)->excludes(force)->excludes(dry_run);

@@ -65,7 +65,7 @@ json text_of(const Map& map, const char* key, const std::string& where) {
   if (map.metadata.contains(std::string(key) + " 1"))  // as merge numbers them
     instead = "those of several runs: a merged map cannot be continued";
   else if (found == map.metadata.end())
-    instead = "none: not a map that can be continued";
+    instead = "none: a merged map, a part of one, or another map that cannot be continued";
   throw FormatError(
       describe_mismatch(where, std::string("text '") + key + "'", "that of a map of reconstruct", instead));
 }
@@ -101,12 +101,29 @@ void require_same_recording(const json& progress, const Map& map, const Sequence
                      : "another"));
 }
 
-/// The path of a recording may be spelled in another way: its content is compared instead.
-void require_same_run(const json& then, const json& now, const std::string& where) {
+/// A file or folder may be named in another way, and what matters is its content: where that is compared, or kept
+/// beside the name, the name does not count; elsewhere it counts as a path.
+json comparable(json config) {
+  for (const char* key : {"sequence", "classes", "properties", "confusion"}) config.erase(key);
+  if (config.contains("perception")) config["perception"].erase("segmenter");
+  const auto as_path = [](json& in, const char* key) {
+    if (!in.contains(key) || !in[key].is_string()) return;
+    const std::filesystem::path path = in[key].get<std::string>();
+    std::error_code unknown;
+    const std::filesystem::path canonical =
+        std::filesystem::weakly_canonical(path.has_filename() ? path : path.parent_path(), unknown);
+    if (!unknown) in[key] = canonical.string();
+  };
+  for (const char* key : {"labels", "probs", "touches"}) as_path(config, key);
+  if (config.contains("perception")) as_path(config["perception"], "masks");
+  return config;
+}
+
+void require_same_run(const json& were, const json& are, const std::string& where) {
+  const json then = comparable(were), now = comparable(are);
   std::set<std::string> keys;
   for (const json* config : {&then, &now})
     for (const auto& [key, value] : config->items()) keys.insert(key);
-  keys.erase("sequence");
   Problems problems;
   for (const std::string& key : keys)
     if (const json was = then.value(key, json()), is = now.value(key, json()); was != is)
@@ -118,8 +135,10 @@ void require_same_run(const json& then, const json& now, const std::string& wher
 
 std::string fusion_settings(const nlohmann::ordered_json& config) {
   nlohmann::ordered_json shaping = config;
-  for (const char* key : {"sequence", "frames", "labels", "probs", "classes", "properties", "touches"})
+  for (const char* key : {"sequence", "frames", "labels", "probs", "classes", "properties", "touches", "confusion"})
     shaping.erase(key);
+  if (shaping.contains("perception"))
+    for (const char* key : {"segmenter", "masks"}) shaping["perception"].erase(key);
   return json_text(shaping);
 }
 

@@ -9,6 +9,7 @@
 #include "apps/options/run_settings.h"
 #include "apps/options/touch_options.h"
 #include "core/error.h"
+#include "io/files/content_hash.h"
 #include "io/files/text_input.h"
 #include "io/sequence/open_sequence.h"
 #include "io/tables/property_yaml.h"
@@ -55,6 +56,7 @@ TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& 
   if (plan.file.empty()) return plan;
 
   plan.touches = read_touches(plan.file);
+  plan.content = content_hash(read_whole_file(plan.file));
   plan.recorded = int64_t(plan.touches.size());
   if (plan.properties.empty())
     plan.unused = "a property table (--properties)";
@@ -108,9 +110,21 @@ void print_left_out(const TouchPlan& plan, const std::vector<TouchOutcome>& outc
                  outcomes.size());
 }
 
+void warn_if_changed(const TouchPlan& plan, const std::string& then) {
+  if (plan.file.empty()) return;
+  const nlohmann::json earlier = nlohmann::json::parse(then, nullptr, false);
+  if (earlier.is_object() && earlier.value("content", "") == plan.content) return;
+  spdlog::warn(
+      "{}: {}, and not applied, as the map was complete before: feltmap touch MAP --file applies what is new, in a "
+      "file "
+      "of its own",
+      plan.file.string(), earlier.is_object() ? "has changed" : "came later");
+}
+
 nlohmann::ordered_json touches_json(const TouchPlan& plan, const std::vector<TouchOutcome>& outcomes) {
   nlohmann::ordered_json json;
   json["file"] = plan.file.string();
+  json["content"] = plan.content;
   json["recorded"] = plan.recorded;
   json["applied"] =
       std::count_if(outcomes.begin(), outcomes.end(), [](const TouchOutcome& o) { return bool(o.effect); });

@@ -15,6 +15,7 @@ struct TouchPlan {
   PropertyTable properties;
   std::filesystem::path file;  ///< empty: there are none
   std::vector<RecordedTouch> touches;
+  std::string content;                       ///< of the file, a hash
   int64_t recorded = 0;                      ///< rows of the file
   int64_t left_out = 0;                      ///< recorded before or after the selected frames
   std::string unused;                        ///< why none of them is applied; empty: they are
@@ -34,6 +35,9 @@ std::vector<TouchOutcome> apply_touches(Map& map, const TouchPlan& plan);
 /// One line on stderr for every touch that was refused, for those that counted already, and for all of them where they
 /// are unused.
 void print_left_out(const TouchPlan& plan, const std::vector<TouchOutcome>& outcomes);
+
+/// Says where the file is another one than that of the run whose `touches_json` this is (empty: it had none).
+void warn_if_changed(const TouchPlan& plan, const std::string& then);
 
 /// For the report: how many were recorded, applied, counted already and left out, and which were refused, with line and
 /// reason.

@@ -39,9 +39,26 @@ void add_perception_options(CLI::App& command, PerceptionSettings& settings, con
       ->group(group);
 }
 
-void check(const PerceptionSettings& settings, const std::string& net_option, Problems& problems) {
+void require_use(PerceptionSettings& settings, const PerceptionSources& from, bool keeps_instances,
+                 Problems& problems) {
+  const PerceptionSettings& line = from.command_line;
+  const auto complain = [&](bool on_line, const std::string& option, const std::string& key, const std::string& needs) {
+    if (on_line)
+      problems.add_of_usage(describe_mismatch(option, "what it is for", needs, "none"));
+    else
+      problems.add(describe_mismatch(from.file + ": " + key, "what it is for", needs, "none"));
+  };
   if (settings.top.value_or(0) > 0 && settings.network.empty())
-    problems.add_of_usage(describe_mismatch("--top", "network", "one, by " + net_option, "none"));
+    complain(line.top.has_value(), "--top", "top", from.net_option);
+  if (settings.color_step && !settings.votes_by(SegmentSource::geometric)) {
+    if (line.color_step || !line.vote)
+      complain(line.color_step.has_value(), "--segment-color", "segment_color", "--vote geometric");
+    settings.color_step.reset();
+  }
+  if (!settings.masks.empty() && !settings.votes_by(SegmentSource::instances) && !keeps_instances) {
+    if (!line.masks.empty() || !line.vote) complain(!line.masks.empty(), "--masks", "masks", from.users_of_masks);
+    settings.masks.clear();
+  }
 }
 
 Perception perception_of(const PerceptionSettings& settings, const ClassTable& classes) {

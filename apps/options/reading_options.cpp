@@ -10,43 +10,43 @@
 namespace felt::apps {
 
 void add_reading_options(CLI::App& command, ReadingArguments& a) {
-  const char* reading = "Sequence (found in it, or the layout's default, unless given)";
-  command.add_option("--format", a.format, "Layout: 7scenes, tum, replica, generic, ...")->group(reading);
-  command.add_option("--frames", a.frames, "Frames a:b:step in recorded order, counted from 0")->group(reading);
-  command.add_option("--intrinsics", a.intrinsics, "fx,fy,cx,cy of the depth image, pixels")->group(reading);
+  command.add_option("--format", a.format, "Layout: 7scenes, tum, replica, generic, ...")->group(kReadingGroup);
+  command.add_option("--frames", a.frames, "Frames a:b:step in recorded order, counted from 0")->group(kReadingGroup);
+  command.add_option("--intrinsics", a.intrinsics, "fx,fy,cx,cy of the depth image, pixels")->group(kReadingGroup);
   command.add_option("--distortion", a.distortion, "k1,k2,p1,p2[,k3] of the depth image's lens (radial-tangential)")
-      ->group(reading);
-  command.add_option("--depth-scale", a.depth_scale, "Stored depth units per metre")->group(reading);
+      ->group(kReadingGroup);
+  command.add_option("--depth-scale", a.depth_scale, "Stored depth units per metre")->group(kReadingGroup);
   command.add_option("--depth-encoding", a.depth_encoding, "plain, or rotated3 (16 bits rotated left by 3)")
-      ->group(reading);
+      ->group(kReadingGroup);
   CLI::Option* const along_ray =
-      add_switch(command, "--ray-length", a.ray_length, "Depth is the length of the ray, not z")->group(reading);
+      add_switch(command, "--ray-length", a.ray_length, "Depth is the length of the ray, not z")->group(kReadingGroup);
   add_switch(command, "--no-ray-length", a.ray_length, "Depth is z, also where the sequence says otherwise", false)
       ->excludes(along_ray)
-      ->group(reading);
+      ->group(kReadingGroup);
   command.add_option("--pose-convention", a.pose_convention, "c2w or w2c, opencv or opengl; for example w2c,opengl")
-      ->group(reading);
+      ->group(kReadingGroup);
   command
       .add_option("--body-camera", a.body_camera,
                   "Pose of the camera on the body whose poses are recorded: tx ty tz qx qy qz qw, or 12 or 16 numbers")
-      ->group(reading);
+      ->group(kReadingGroup);
   command
       .add_option("--max-dt", a.max_dt_s,
                   "Largest difference of stamps within a frame, seconds [" +
                       CLI::detail::to_string(SequenceOptions{}.max_dt_s) + "]")
-      ->group(reading);
+      ->group(kReadingGroup);
   command
       .add_option("--stamp-offset", a.stamp_offset, "Added to the stamps of poses: seconds, or frames where numbered")
-      ->group(reading);
-  command.add_option("--labels", a.labels, "Folder of label images")->group(reading);
-  command.add_option("--label-offset", a.label_offset, "Added to every label id")->group(reading);
+      ->group(kReadingGroup);
+  command.add_option("--labels", a.labels, "Folder of label images")->group(kReadingGroup);
+  command.add_option("--label-offset", a.label_offset, "Added to every label id")->group(kReadingGroup);
   command
       .add_option("--probs", a.probs,
                   "Folder of class probability images (docs/datasets.md#labels), or of confidences beside --labels")
-      ->group(reading);
-  command.add_option("--classes", a.classes, "Class table (classes.yaml, or a CSV of id and name)")->group(reading);
-  add_switch(command, "--bgr", a.bgr, "Colour images hold red and blue exchanged")->group(reading);
-  add_switch(command, "--no-color", a.no_color, "Do not read colour images")->group(reading);
+      ->group(kReadingGroup);
+  command.add_option("--classes", a.classes, "Class table (classes.yaml, or a CSV of id and name)")
+      ->group(kReadingGroup);
+  add_switch(command, "--bgr", a.bgr, "Colour images hold red and blue exchanged")->group(kReadingGroup);
+  add_switch(command, "--no-color", a.no_color, "Do not read colour images")->group(kReadingGroup);
 }
 
 SequenceOptions resolve(const ReadingArguments& a, SequenceOptions reading, Problems& problems) {

@@ -22,7 +22,9 @@ struct ReadingArguments {
   std::optional<int> label_offset;
 };
 
-/// Adds the options in a group of the help.
+/// Their group in the help.
+inline constexpr const char* kReadingGroup = "Sequence (found in it, or the layout's default, unless given)";
+
 void add_reading_options(CLI::App& command, ReadingArguments& arguments);
 
 /// Lays what was given over `base` (a configuration file's settings, or defaults). Adds to `problems` what cannot be

@@ -70,10 +70,9 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
   add_switch(command, "--carve", a.carve, "Let free space seen later erase what stood there")->group(map);
 
   add_reading_options(command, a.reading);
-  const char* reading = "Sequence (found in it, or the layout's default, unless given)";
-  command.add_option("--properties", a.properties, "Property table (properties.yaml)")->group(reading);
+  command.add_option("--properties", a.properties, "Property table (properties.yaml)")->group(kReadingGroup);
   command.add_option("--touches", a.touches, "Recorded touches (touches.csv), each at its stamp or frame")
-      ->group(reading);
+      ->group(kReadingGroup);
   add_label_options(command, a.label_settings);
   add_perception_options(command, a.perception, "--segmenter");
 }
@@ -110,8 +109,6 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
 
   SequenceOptions& reading = options.reading;
   options.perception = overlaid(a.perception, file.perception);
-  check(options.perception, "--segmenter", problems);
-  reading.instances_dir = options.perception.masks;
   if (!options.perception.network.empty())
     problems.expect(reading.read_color, "--segmenter", "colour", "colour images to look at", "--no-color");
 
@@ -152,9 +149,10 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
                   "--label-cap", "evidence of a voxel",
                   "at least that of one observation, " + number_text(fusion.labels.evidence),
                   number_text(fusion.labels.max_evidence));
+  require_use(options.perception, {a.perception, "--segmenter", "--vote instances or --instances", a.config.string()},
+              fusion.labels.instances, problems);
+  reading.instances_dir = options.perception.masks;
   reading.read_instances = fusion.labels.instances || options.perception.votes_by(SegmentSource::instances);
-  problems.expect(options.perception.masks.empty() || reading.read_instances, "--masks", "what they are for",
-                  "--vote instances or --instances", "neither");
   problems.throw_if_any();
   require_bands_that_fit(options);
   return options;

@@ -41,6 +41,24 @@ size_t voxels_missing_from(const Map& map, const Map& older) {
   return missing;
 }
 
+/// Pairs of a voxel and a class with evidence in an older map and none in the new one: its images were labelled
+/// otherwise.
+size_t evidence_missing_from(const Map& map, const Map& older) {
+  size_t missing = 0;
+  for (const Block& block : older.store.blocks()) {
+    const Block* kept = map.store.get(block.coord);
+    for (const EvidencePlane& plane : block.evidence) {
+      const Plane* counts = nullptr;
+      if (kept != nullptr)
+        for (const EvidencePlane& other : kept->evidence)
+          if (other.slot == plane.slot) counts = other.counts;
+      for (int i = 0; i < kBlockVoxels; ++i)
+        missing += plane.counts->value[i] > 0 && !(counts != nullptr && counts->value[i] > 0);
+    }
+  }
+  return missing;
+}
+
 /// Touches of an older map that count, and in the new one do not (`undone_too`) or are not known at all.
 size_t touches_missing_from(const TouchJournal& journal, const TouchJournal& older, bool undone_too) {
   return size_t(std::count_if(older.touches.begin(), older.touches.end(), [&](const Touch& touch) {
@@ -65,6 +83,9 @@ std::string missing_from(const Map& map, const Map& older, LostTouches touches) 
   // A part that was cut out has the whole journal of frames.
   if (const size_t voxels = voxels_missing_from(map, older); voxels > 0)
     return "a map with " + std::to_string(voxels) + " observed voxels that the new one does not hold";
+  // Which images held the labels is not in the journal.
+  if (const size_t labels = evidence_missing_from(map, older); labels > 0)
+    return "a map with class evidence that the new one does not hold (" + std::to_string(labels) + " counts)";
   return "";
 }
 

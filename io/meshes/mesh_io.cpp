@@ -27,12 +27,18 @@ TriangleMesh read_mesh(const fs::path& path) {
   throw FormatError(describe_mismatch(path.string(), "mesh", ".ply or .obj", "'" + extension + "'"));
 }
 
+void require_mesh_name(const fs::path& path) {
+  const std::string extension = lower_extension(path);
+  if (extension != ".ply" && extension != ".obj" && extension != ".glb")
+    throw ConfigError(describe_mismatch(path.string(), "mesh", ".ply, .obj or .glb", "'" + extension + "'"));
+}
+
 void write_mesh(const fs::path& path, const TriangleMesh& mesh) {
+  require_mesh_name(path);
   const std::string extension = lower_extension(path);
   if (extension == ".ply") return write_ply(path, mesh);
   if (extension == ".obj") return write_obj(path, mesh);
-  if (extension == ".glb") return write_glb(path, mesh);
-  throw ConfigError(describe_mismatch(path.string(), "mesh", ".ply, .obj or .glb", "'" + extension + "'"));
+  write_glb(path, mesh);
 }
 
 }  // namespace felt

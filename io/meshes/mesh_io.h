@@ -13,6 +13,9 @@ namespace felt {
 /// FormatError, with the line or byte, where it does not hold what its header says.
 TriangleMesh read_mesh(const std::filesystem::path& path);
 
+/// Throws ConfigError for a name that `write_mesh` cannot write by.
+void require_mesh_name(const std::filesystem::path& path);
+
 /// Writes a mesh by the name's extension: .ply, .obj or .glb. Whole or not at all (io/files/atomic_file.h); throws
 /// IoError, and ConfigError for another extension.
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh);

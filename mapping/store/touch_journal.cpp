@@ -60,6 +60,17 @@ void put_in_order(TouchJournal& journal, Touch touch) {
   journal.touches.insert(at, std::move(touch));
 }
 
+/// Tells apart what two maps noted of one touch: where it met their surfaces, and what was believed.
+uint64_t digest_of_note(const Touch& touch) {
+  Digest digest;
+  digest << touch.surface_m.x() << touch.surface_m.y() << touch.surface_m.z() << touch.refused_voxels;
+  for (const BeliefSummary* belief : {&touch.before, &touch.after}) {
+    digest << belief->class_entropy << belief->mean << belief->sd << uint64_t(belief->class_probability.size());
+    for (const double p : belief->class_probability) digest << p;
+  }
+  return digest.value().low64;
+}
+
 }  // namespace
 
 const char* model_name(TouchModel model) { return model == TouchModel::material ? "material" : "mixture"; }
@@ -107,8 +118,10 @@ TouchJournal joined(const TouchJournal& a, const TouchJournal& b) {
       put_in_order(all, touch);
       continue;
     }
-    known->region = united(known->region, touch.region);
-    known->undone = known->undone && touch.undone;
+    Touch both = digest_of_note(touch) < digest_of_note(*known) ? touch : *known;
+    both.region = united(known->region, touch.region);
+    both.undone = known->undone && touch.undone;
+    *known = std::move(both);
   }
   return all;
 }

@@ -324,6 +324,39 @@ TEST_CASE("a part with voxels and without a surface is written empty, and a warn
   CHECK_THAT(run_feltmap("export --force " + quoted(floor.map) + " --mesh " + quoted(ply)).err, !Contains("empty"));
 }
 
+TEST_CASE("a box that is thinner than a voxel holds the vertices within it") {
+  const TouchedFloor floor;
+  const fs::path all = floor.directory.path() / "all.ply", thin = floor.directory.path() / "thin.ply";
+  floor.exported("--points " + quoted(all));
+  // Beside the surface's own height no voxel has its centre.
+  const float z = read_mesh(all).positions.front().z();
+  const std::string low = std::to_string(z - 1e-4f), high = std::to_string(z + 1e-4f);
+  const std::string box = " --box=-0.0099,-0.0099," + low + ",0.0099,0.2099," + high;
+  const size_t points = floor.exported("--points " + quoted(thin) + box)["points"]["points"];
+  CHECK(points > 0);
+  CHECK(read_mesh(thin).positions.size() == points);
+}
+
+TEST_CASE("an export that cannot be finished is refused before it writes anything") {
+  const TouchedFloor floor;
+  const fs::path folder = floor.directory.path(), vdb = folder / "out.vdb", ply = folder / "out.ply";
+  const auto refused = [&](const std::string& options, int code) {
+    const CommandResult result = run_feltmap("export " + quoted(floor.map) + options);
+    INFO(options << "\n" << result.err);
+    CHECK(result.exit_code == code);
+    CHECK_FALSE(fs::exists(vdb));
+    CHECK_FALSE(fs::exists(ply));
+  };
+  refused(" --vdb " + quoted(vdb) + " --mesh " + quoted(ply) + " --color-by nonsense", 3);
+  refused(" --vdb " + quoted(vdb) + " --mesh " + quoted(folder / "out.stl"), 3);
+  refused(" --mesh " + quoted(ply) + " --points " + quoted(folder / "out.xyz"), 3);
+  refused(" --mesh " + quoted(ply) + " --html " + quoted(folder / "nowhere" / "out.html"), 4);
+  // Nor does it pass over what would do nothing.
+  refused(" --vdb " + quoted(vdb) + " --color-by class", 2);
+  refused(" --mesh " + quoted(ply) + " --up -y", 2);
+  refused(" --mesh " + quoted(ply) + " --half", 2);
+}
+
 TEST_CASE("values that 16 bits cannot hold keep 32, and a warning says of which grids") {
   TouchedFloor floor;
   Map map = load_map(floor.map);

@@ -94,6 +94,27 @@ TEST_CASE("a run goes on only with the tables and contents that it began with") 
   CHECK(map_hash(load_map(recording.map)) == hash);
 }
 
+TEST_CASE("a run goes on although its files are named in another way") {
+  const Recording recording;
+  const fs::path folder = recording.folder.path(), labels = folder / "labels";
+  fs::rename(recording.sequence / "labels", labels);
+  fs::rename(recording.sequence / "classes.yaml", folder / "classes.yaml");
+  write_text(folder / "confusion.csv", "x,wall,floor,sofa\nwall,0.8,0.1,0.1\nfloor,0.1,0.8,0.1\nsofa,0.1,0.1,0.8\n");
+  const auto options = [](const std::string& root) {
+    return "--labels " + root + "labels --classes " + root + "classes.yaml --confusion " + root + "confusion.csv";
+  };
+  REQUIRE(recording.reconstruct(options(folder.string() + "/")).exit_code == 0);
+  const CommandResult resumed = recording.reconstruct(options(folder.string() + "/result/../") + " --resume");
+  INFO(resumed.err);
+  CHECK(resumed.exit_code == 0);
+  fs::rename(labels, folder / "others");
+  std::string elsewhere = options(folder.string() + "/");
+  elsewhere.replace(elsewhere.find("labels --classes"), 6, "others/");
+  const CommandResult others = recording.reconstruct(elsewhere + " --resume");
+  CHECK(others.exit_code == 3);
+  CHECK_THAT(others.err, Contains("labels: expected") && Contains("others"));
+}
+
 TEST_CASE("touches that come after a complete run are said not to be applied") {
   const Recording recording;
   REQUIRE(recording.reconstruct().exit_code == 0);
@@ -101,6 +122,15 @@ TEST_CASE("touches that come after a complete run are said not to be applied") {
   const CommandResult result = recording.reconstruct("--resume");
   CHECK(result.exit_code == 0);
   CHECK_THAT(result.err, Contains("touches.csv") && Contains("not applied"));
+  // And where the run had a file of touches, those that were added.
+  REQUIRE(recording.reconstruct("--force").exit_code == 0);
+  CHECK_THAT(recording.reconstruct("--resume").err, !Contains("not applied"));
+  write_text(recording.sequence / "touches.csv",
+             "frame,u,v,property,value\n0,12,8,friction,0.4\n1,12,8,friction,0.41\n");
+  const CommandResult grown = recording.reconstruct("--resume");
+  CHECK(grown.exit_code == 0);
+  CHECK_THAT(grown.err, Contains("touches.csv: has changed") && Contains("not applied"));
+  CHECK(load_map(recording.map).touches.touches.size() == 1);
 }
 
 TEST_CASE("commands that change one map wait for each other, and none writes into a folder at work") {
@@ -143,6 +173,23 @@ TEST_CASE("a touched copy and a merged map replace only what they hold") {
   const fs::path touched = recording.folder.path() / "touched.vdb";
   REQUIRE(run_feltmap(recording.touch() + " --out " + quoted(touched)).exit_code == 0);
   refused(merge + quoted(touched), 4, "1 touches");
+}
+
+TEST_CASE("a map of the same frames with other labels is not replaced") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const fs::path labels = recording.folder.path() / "labels", out = recording.folder.path() / "other";
+  fs::create_directory(labels);
+  for (int i = 0; i < 4; ++i)
+    write_bytes(labels / (std::to_string(i) + ".png"), encode_png(Image<uint16_t>(kWidth, kHeight, 3)));
+  REQUIRE(run_feltmap("reconstruct " + quoted(recording.sequence) + " --labels " + quoted(labels) + " --out " +
+                      quoted(out) + " --voxel-size 0.05 --quiet")
+              .exit_code == 0);
+  const std::string before = file_text(recording.map);
+  refused("merge " + quoted(out / "map.vdb") + " --out " + quoted(recording.map), 4, "class evidence");
+  refused(recording.touch("0.4", out / "map.vdb") + " --out " + quoted(recording.map), 4, "class evidence");
+  CHECK(file_text(recording.map) == before);
+  CHECK(run_feltmap("merge " + quoted(recording.map) + " --out " + quoted(recording.map)).exit_code == 0);
 }
 
 TEST_CASE("a part that was cut out of a map does not replace it, although it knows the same frames") {
@@ -260,6 +307,20 @@ TEST_CASE("a part of a map is not merged with the whole, and no run goes on with
       4, "continued");
 }
 
+TEST_CASE("no run goes on with a merged map, of one map or of equal ones") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const fs::path copy = recording.folder.path() / "copy.vdb", merged = recording.folder.path() / "merged" / "map.vdb";
+  fs::copy_file(recording.map, copy);
+  fs::create_directory(merged.parent_path());
+  for (const std::string maps : {quoted(copy), quoted(copy) + " " + quoted(recording.map) + " --allow-shared-frames"}) {
+    REQUIRE(run_feltmap("merge --force " + maps + " --out " + quoted(merged)).exit_code == 0);
+    refused("reconstruct " + quoted(recording.sequence) + " --voxel-size 0.05 --resume --out " +
+                quoted(merged.parent_path()),
+            4, "none: a merged map");
+  }
+}
+
 TEST_CASE("maps whose properties or votes differ are no equal maps") {
   const TemporaryDirectory folder;
   const std::string a = (folder.path() / "a.vdb").string(), b = (folder.path() / "b.vdb").string();
@@ -280,6 +341,13 @@ TEST_CASE("maps whose properties or votes differ are no equal maps") {
       for (int v = 0; v < kBlockVoxels; ++v) planes->votes[v] = uint16_t(planes->id[v] != 0 ? planes->votes[v] + 1 : 0);
   save_map(map, b);
   CHECK(run_feltmap("diff --tol 0 " + a + " " + b).exit_code == 1);
+  CHECK(run_feltmap("diff --tol 1 " + a + " " + b).exit_code == 0);
+  // Ids are names: no tolerance makes two of them equal.
+  for (uint32_t i = 0; i < map.store.size(); ++i)
+    if (InstancePlanes* planes = map.store[i].instance)
+      for (int v = 0; v < kBlockVoxels; ++v) planes->id[v] = uint16_t(planes->id[v] != 0 ? planes->id[v] + 1 : 0);
+  save_map(map, b);
+  CHECK(run_feltmap("diff --tol 1000 " + a + " " + b).exit_code == 1);
 }
 
 TEST_CASE("a run that can fuse nothing leaves the map that lies there, checkpoints or not") {

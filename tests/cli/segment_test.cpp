@@ -150,10 +150,28 @@ TEST_CASE("options that would do nothing are refused") {
     CHECK_FALSE(fs::exists(setting.out));
   };
   const std::string scene = quoted(setting.sequence);
-  refused("reconstruct " + scene + " --top 3", "--top: network: expected one, by --segmenter, found none");
-  refused("segment " + scene + " --vote geometric --top 3", "--top: network: expected one, by --net, found none");
+  refused("reconstruct " + scene + " --top 3", "--top: what it is for: expected --segmenter, found none");
+  refused("segment " + scene + " --vote geometric --top 3", "--top: what it is for: expected --net, found none");
   refused("reconstruct " + scene + " --vote geometric --masks " + quoted(setting.folder.path()), "--masks");
   refused("segment " + scene + " --vote geometric --masks " + quoted(setting.folder.path()), "--masks");
+  refused("reconstruct " + scene + " --segment-color 5", "--segment-color: what it is for: expected --vote geometric");
+  // What a file says is a fault of configuration, unless the command line's --vote is why it does nothing.
+  const auto configured = [&](const std::string& text, const std::string& options) {
+    std::ofstream(setting.folder.path() / "settings.yaml") << text;
+    return run_feltmap("reconstruct " + scene + " --frames 0:1 --voxel-size 0.1 --quiet --config " +
+                       quoted(setting.folder.path() / "settings.yaml") + " --out " + quoted(setting.out) + options);
+  };
+  for (const std::string text :
+       {"top: 3\n", "masks: .\n", "segment_color: 5\n", "vote: instances\nsegment_color: 5\n"}) {
+    const CommandResult result = configured(text, "");
+    INFO(text << result.err);
+    CHECK(result.exit_code == 3);
+    CHECK(result.err.find("settings.yaml: ") != std::string::npos);
+    CHECK_FALSE(fs::exists(setting.out));
+  }
+  const CommandResult overruled = configured("vote: instances\nmasks: .\n", " --vote none");
+  INFO(overruled.err);
+  CHECK(overruled.exit_code == 0);
 }
 
 TEST_CASE("a network that cannot be used ends segment and reconstruct with one line and no output") {

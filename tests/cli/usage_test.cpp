@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "io/map_file/map_file.h"
 #include "tests/cli/command.h"
 #include "tests/support/data.h"
 
@@ -92,6 +93,25 @@ TEST_CASE("words of the command line that cannot be read are faults of it, whate
     CHECK_THAT(format.err, Catch::Matchers::Contains("--format: layout: expected one of ") &&
                                Catch::Matchers::Contains("found 'foo'"));
   }
+}
+
+TEST_CASE("options that a map or a recording has no use for are named") {
+  const std::string scene = (source_dir() / "data/scenes/room").string();
+  const TemporaryDirectory folder;
+  const std::string map = (folder.path() / "map.vdb").string();
+  Map empty(0.05, 0.2);
+  save_map(empty, map);
+  const auto refused = [](const std::string& arguments, const std::string& option) {
+    const CommandResult result = run_feltmap(arguments);
+    INFO(arguments << ": " << result.err);
+    CHECK(result.exit_code == 2);
+    CHECK_THAT(result.err, Catch::Matchers::Contains(option));
+  };
+  refused("info " + map + " --frames 0:3", "--frames: what to describe: expected a sequence");
+  refused("info " + map + " --pictures " + folder.path().string(), "--pictures");
+  refused("info " + scene + " --grids", "--grids: what to describe: expected a map");
+  refused("touch " + map + " --file x.csv --mask y.png", "--mask");
+  refused("touch " + map + " --sequence x --frame 1 --pixel 1,1 --property p --value 1 --pose 1", "--pose");
 }
 
 TEST_CASE("numbers that cannot be used are repeated as they were given, each once") {

@@ -89,7 +89,8 @@ TEST_CASE("one changed value of each kind of plane is found, in its channel and 
     CHECK(channel(d, c.channel).max_difference == Approx(c.difference).epsilon(1e-5));
     CHECK(beyond(d, 0));
     CHECK(beyond(d, 0.99 * c.difference));
-    CHECK_FALSE(beyond(d, 1.01 * c.difference));
+    // Ids are names: no tolerance makes two of them equal.
+    CHECK(beyond(d, 1.01 * c.difference) == (std::string(c.channel) == "instance"));
     for (const ChannelDifference& other : d.channels) {
       INFO(other.name);
       CHECK(other.voxels_changed == (other.name == c.channel ? 1 : 0));

@@ -45,6 +45,12 @@ TEST_CASE("joining two journals gives every touch once, whichever comes first") 
   CHECK(both.touches[0].request.stamp_s == 1);
   CHECK(both.touches[2].request.stamp_s == 3);
   CHECK(journal_digest(both) == journal_digest(joined(right, left)));
+  // What either noted of the shared touch at the time may differ: one of the two is kept, always the same.
+  const uint64_t id = both.touches[1].id;
+  left.find(id)->after.mean = 0.3, right.find(id)->after.mean = 0.2;
+  const double kept = joined(left, right).find(id)->after.mean;
+  CHECK((kept == 0.3 || kept == 0.2));
+  CHECK(joined(right, left).find(id)->after.mean == kept);
 }
 
 TEST_CASE("a touch that two journals share is undone where both say so, and has the regions of both") {
