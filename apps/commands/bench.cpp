@@ -75,10 +75,6 @@ Json fusion_cost(const DecodedFrames& decoded, const ClassTable& classes, double
 }
 
 int run(const BenchOptions& o) {
-  for (const double size : o.voxel_sizes_m)
-    if (!(size > 0))
-      throw ConfigError(
-          describe_mismatch("--voxel-sizes", "edge of a voxel in metres", "numbers above 0", Json(size).dump()));
   const auto sequence = open_sequence(o.sequence, {});
   const DecodedFrames decoded = decode(*sequence, o.frames);
   if (decoded.frames.empty())
@@ -93,7 +89,8 @@ int run(const BenchOptions& o) {
                  {"fusion", Json::array()}};
   std::vector<int> thread_counts = {1};
   if (o.thread_count() > 1) thread_counts.push_back(o.thread_count());
-  if (!o.json)
+  const bool print = !o.json && !o.quiet;
+  if (print)
     std::printf(
         "%zu frames of %dx%d, SIMD %s, decoding %.2f ms a frame on one thread\n"
         "voxel     threads   fuse ms   mesh ms   blocks      MB\n",
@@ -102,7 +99,7 @@ int run(const BenchOptions& o) {
   for (const double size : o.voxel_sizes_m)
     for (const int threads : thread_counts) {
       const Json row = fusion_cost(decoded, sequence->info().classes, size, threads, o.repetitions);
-      if (!o.json)
+      if (print)
         std::printf("%-9g %-9d %-9.3f %-9.1f %-11zu %.1f\n", size, threads, row["fuse_ms"].get<double>(),
                     row["mesh_ms"].get<double>(), row["blocks"].get<size_t>(), row["bytes"].get<double>() * 1e-6);
       report["fusion"].push_back(row);
@@ -122,7 +119,9 @@ void add_bench(CLI::App& app) {
        "feltmap bench recording --voxel-sizes 0.01 0.02 --max-frames 50 --json"},
       *options, [options] { return run(*options); });
   command.add_option("SEQUENCE", options->sequence, "Folder of a recorded RGB-D sequence, or a .sens file")->required();
-  command.add_option("--voxel-sizes", options->voxel_sizes_m, "Edges of a voxel, metres")->capture_default_str();
+  command.add_option("--voxel-sizes", options->voxel_sizes_m, "Edges of a voxel, metres")
+      ->check(above_zero_up_to(100))
+      ->capture_default_str();
   command.add_option("--max-frames", options->frames, "Frames that are decoded and held in memory")
       ->check(above_zero())
       ->capture_default_str();

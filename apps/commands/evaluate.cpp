@@ -41,6 +41,7 @@ struct EvaluateCommand {
   ObservingCameras cameras;
   SequenceOptions reading;  ///< how a sequence is read, be it for its labels or for its poses
   CLI::Option *intrinsics = nullptr, *size = nullptr, *min_depth = nullptr, *max_depth = nullptr;
+  std::vector<CLI::Option*> of_surfaces;
 };
 
 /// What is evaluated: a map, or a mesh, or the map's mesh where geometry is asked for.
@@ -240,12 +241,19 @@ void check(const EvaluateCommand& c) {
     throw CLI::RequiredError("--reference-mesh, --reference-labels or --reference-readings");
   need(c.reliability.empty() || !c.reference_labels.empty() || !c.label_name.empty(), "--reliability",
        "--reference-labels, or --reference-mesh with --label-name");
-  const bool of_sequence = !c.reference_labels.empty() || fs::is_directory(c.trajectory);
+  const bool of_sequence = !c.reference_labels.empty() || names_sequence(c.trajectory);
   need(c.frames.empty() || of_sequence, "--frames", "--reference-labels or --trajectory SEQUENCE");
   need(c.format.empty() || of_sequence, "--format", "--reference-labels or --trajectory SEQUENCE");
-  need(!fs::is_regular_file(c.trajectory) || (c.intrinsics->count() > 0 && c.size->count() > 0), "--trajectory FILE",
-       "--intrinsics and --size");
+  need(!fs::is_regular_file(c.trajectory) || names_sequence(c.trajectory) ||
+           (c.intrinsics->count() > 0 && c.size->count() > 0),
+       "--trajectory FILE", "--intrinsics and --size");
   need(c.trajectory.empty() || !c.reference_mesh.empty(), "--trajectory", "--reference-mesh");
+  need(c.size->count() == 0 || (!c.trajectory.empty() && !names_sequence(c.trajectory)), "--size", "--trajectory FILE");
+  need(c.labels.empty() || !c.reference_labels.empty(), "--labels", "--reference-labels");
+  need(c.classes.empty() || !c.reference_labels.empty() || !c.label_name.empty(), "--classes",
+       "--reference-labels or --label-name");
+  for (const CLI::Option* option : c.of_surfaces)
+    need(option->count() == 0 || !c.reference_mesh.empty(), option->get_name().c_str(), "--reference-mesh");
   need(c.properties.empty() || !c.reference_readings.empty(), "--properties", "--reference-readings");
   need(c.label_name.empty() || !c.reference_mesh.empty() || !c.reference_labels.empty(), "--label-name",
        "--reference-mesh or --reference-labels");
@@ -319,6 +327,8 @@ void compare_sequence_labels(const EvaluateCommand& command, const Evaluated& ev
           " m whose true label is a class; the prediction is that of the surface that the pixel's ray meets first");
   found.calibration = labels.scores.calibration;
   if (found.print) print_labels(labels.scores, "the views");
+  if (found.print && !labels.skipped.empty())
+    std::printf("not counted         views: %s\n", skipped_text(labels.skipped).c_str());
 }
 
 void compare_readings(const EvaluateCommand& command, Evaluated& evaluated, Comparison& found) {
@@ -397,6 +407,7 @@ void add_evaluate(CLI::App& app) {
                "Leave out what the trajectory did not see of the reconstruction, too")
       ->needs("--trajectory")
       ->group(geometry);
+  for (const char* name : {"--samples", "--seed", "--threshold"}) command.of_surfaces.push_back(sub.get_option(name));
   add_camera_options(sub, command.camera);
   // The defaults serve nothing here: a recording brings its camera, poses alone need the one they were taken with.
   const std::string required = " (required where --trajectory is a file of poses)";

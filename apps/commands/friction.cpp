@@ -8,6 +8,7 @@
 #include "apps/command.h"
 #include "apps/commands/commands.h"
 #include "apps/exit_code.h"
+#include "apps/options/number_checks.h"
 #include "apps/options/run_settings.h"
 #include "apps/options/touch_options.h"
 #include "apps/output/belief_report.h"
@@ -25,11 +26,13 @@ using json = nlohmann::ordered_json;
 struct FrictionOptions : CommonOptions {
   std::string log, normal, map, at, plot, touch;
   FrictionSettings settings;
+  bool overwrite = false;
 };
 
 int run_friction(const FrictionOptions& options) {
   require_ending(options.plot, ".svg");
   require_ending(options.touch, ".csv");
+  if (!options.touch.empty()) require_no_file(options.touch, options.overwrite);
   FrictionSettings settings = options.settings;
   std::string normal_from = "assumed: the z axis";
   double normal_sd_rad = 0;
@@ -103,11 +106,14 @@ void add_friction(CLI::App& app) {
   command
       .add_option("--cutoff", options->settings.cutoff_hz,
                   "Low-pass cut-off, Hz: -3 dB of each of two passes, forwards and backwards")
+      ->check(above_zero())
       ->capture_default_str();
   command.add_option("--contact-force", options->settings.contact_n, "Normal force of a contact, N")
+      ->check(above_zero())
       ->capture_default_str();
   command.add_option("--touch", options->touch, "Write the reading as a touches.csv for `feltmap touch --file`")
       ->needs(at);
+  command.add_flag("--force", options->overwrite, "Replace the file of --touch where it exists");
   command.add_option("--plot", options->plot, "Write a picture of the log and what was found in it (SVG)");
 }
 

@@ -11,6 +11,7 @@
 #include "apps/commands/commands.h"
 #include "apps/exit_code.h"
 #include "apps/options/number_checks.h"
+#include "apps/options/problems.h"
 #include "apps/output/output_files.h"
 #include "core/error.h"
 #include "core/simd.h"
@@ -54,7 +55,7 @@ int run_infer(const InferOptions& options) {
   require_ending(options.plot, ".svg");
   require_ending(options.properties_out, ".yaml");
   if (!options.properties_out.empty()) require_no_file(options.properties_out, options.overwrite);
-  if (!options.simd.empty()) choose_simd(options.simd, "--simd");
+  if (!options.simd.empty()) of_command_line([&] { choose_simd(options.simd, "--simd"); });
   if (!options.fit_priors.empty()) return run_fit(options);
   std::ios::sync_with_stdio(false);
   size_t number = 0, faulty = 0;

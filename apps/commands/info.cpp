@@ -269,8 +269,7 @@ int run(const InfoOptions& o) {
   const fs::path& path = o.path;
   if (!fs::exists(path))
     throw IoError(describe_mismatch(path.string(), "what to describe", "a map file or a sequence", "nothing there"));
-  // Sequences are folders, but for containers and single scans.
-  const bool is_map = fs::is_regular_file(path) && path.extension() != ".sens" && path.extension() != ".bin";
+  const bool is_map = fs::is_regular_file(path) && !names_sequence(path);
   check(o, is_map);
   const SequenceOptions options = resolve(o.reading);
   Json json = is_map ? describe_map(path, o.grids) : describe_sequence(path, options);

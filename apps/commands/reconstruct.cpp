@@ -199,6 +199,10 @@ void warn_of_losses(const ReconstructReport& report, const ReconstructOptions& o
                  listed(fusion.unknown_ids, id_of, kNamed), pixels,
                  fusion.labels.voxels == 0 ? "; no voxel has a label: is it the table of these images?" : "");
   }
+  if (options.reading.label_offset != 0 && fusion.unknown_ids.empty() && fusion.labels.voxels == 0 &&
+      fusion.fused > fusion.without_labels && !map.classes.empty())
+    spdlog::warn("no voxel has a label: --label-offset {} moves every id of the images out of range",
+                 options.reading.label_offset);
   const bool any_instance = std::any_of(map.store.blocks().begin(), map.store.blocks().end(),
                                         [](const Block& block) { return block.instance != nullptr; });
   if (config.labels.instances && fusion.fused > 0 && !any_instance)

@@ -36,7 +36,8 @@ struct RenderCommand {
   std::string map, out, trajectory, format, frames, overview, properties, up = "0,0,1";
   std::vector<std::string> poses;
   std::vector<std::string> images = {"depth", "normal", "color"}, more_images;
-  CLI::Option *images_option = nullptr, *intrinsics = nullptr, *size = nullptr;
+  CLI::Option *images_option = nullptr, *intrinsics = nullptr, *size = nullptr, *up_option = nullptr;
+  std::vector<CLI::Option*> of_views;
   bool colored = false;
   ViewOptions options;
 };
@@ -144,7 +145,7 @@ nlohmann::ordered_json write_view(const RenderCommand& command, const Source& so
 
 /// The camera and the poses, those of --pose first.
 Viewpoints viewpoints_of(const RenderCommand& command) {
-  const bool of_sequence = fs::is_directory(command.trajectory);
+  const bool of_sequence = names_sequence(command.trajectory);
   Problems problems;
   for (const auto& [name, given] :
        {std::pair{"--format", !command.format.empty()}, {"--frames", !command.frames.empty()}})
@@ -156,6 +157,11 @@ Viewpoints viewpoints_of(const RenderCommand& command) {
   Viewpoints views;
   for (const std::string& pose : command.poses)
     problems.attempt_reading([&] { views.T_world_camera.push_back(parse_pose(pose, "--pose")); });
+  for (const CLI::Option* option : command.of_views)
+    if (command.poses.empty() && command.trajectory.empty() && option->count() > 0)
+      problems.add_of_usage(describe_mismatch("render", option->get_name(), "--pose or --trajectory", "none"));
+  if (command.overview.empty() && command.up_option->count() > 0)
+    problems.add_of_usage(describe_mismatch("render", "--up", "--overview, which it is for", "none"));
   problems.throw_if_any();
   if (command.trajectory.empty()) {
     views.camera = camera_of(command.camera);
@@ -168,6 +174,7 @@ Viewpoints viewpoints_of(const RenderCommand& command) {
   options.read_color = options.read_instances = false;
   const Viewpoints recorded = read_viewpoints(command.trajectory, command.camera, options);
   views.camera = recorded.camera;
+  views.frames = recorded.frames;
   views.T_world_camera.insert(views.T_world_camera.end(), recorded.T_world_camera.begin(),
                               recorded.T_world_camera.end());
   return views;
@@ -177,7 +184,7 @@ int render(const RenderCommand& command) {
   const bool views = !command.poses.empty() || !command.trajectory.empty();
   if (!views && command.overview.empty()) throw CLI::RequiredError("--pose, --trajectory or --overview");
   if (views && command.out.empty()) throw CLI::RequiredError("--out");
-  const auto [camera, poses] = viewpoints_of(command);
+  const auto [camera, poses, frames] = viewpoints_of(command);
   Problems problems;
   Map map = load_map(command.map);
   use_properties(map, command.properties);
@@ -207,6 +214,7 @@ int render(const RenderCommand& command) {
 
   nlohmann::ordered_json json = {{"map", command.map}};
   if (views) json["out"] = command.out;
+  if (!frames.empty()) json["frames"] = frames;  // of the last views, those of --pose come first
   json["views"] = nlohmann::ordered_json::array();
   if (!levels.empty()) json["levels"] = levels;
   if (!command.overview.empty()) {
@@ -288,7 +296,10 @@ void add_render(CLI::App& app) {
       ->check(above_zero())
       ->capture_default_str();
   sub.add_option("--overview", command.overview, "One picture of the whole map from outside and above (PNG)");
-  sub.add_option("--up", command.up, "Upward direction in the world, for --overview")->capture_default_str();
+  for (const char* name : {"--out", "--images", "--colored", "--properties", "--intrinsics", "--size", "--max-depth"})
+    command.of_views.push_back(sub.get_option(name));
+  command.up_option =
+      sub.add_option("--up", command.up, "Upward direction in the world, for --overview")->capture_default_str();
 }
 
 }  // namespace felt::apps

@@ -12,6 +12,7 @@
 #include "apps/exit_code.h"
 #include "apps/fusion/interrupt.h"
 #include "apps/options/number_checks.h"
+#include "apps/options/problems.h"
 #include "apps/output/progress.h"
 #include "core/error.h"
 #include "core/text.h"
@@ -49,6 +50,7 @@ struct SimulateOptions {
   double depth_scale = 5000;
   std::string color = "png";
   bool no_mesh = false;
+  std::vector<const CLI::Option*> of_network, of_touches;
 };
 
 int list_scenes(const SimulateOptions& o) {
@@ -78,6 +80,17 @@ Trajectory trajectory_of(const SimulateOptions& o, const Scene& scene) {
   return orbit(middle, 0.35 * std::min(size.x(), size.y()), 0.2 * size.z(), 2 * std::numbers::pi, o.frames);
 }
 
+void check(const SimulateOptions& o) {
+  Problems problems;
+  for (const CLI::Option* option : o.of_network)
+    if (o.network == "none" && option->count() > 0)
+      problems.add_of_usage(describe_mismatch("simulate", option->get_name(), "a --network, which it is for", "none"));
+  for (const CLI::Option* option : o.of_touches)
+    if (o.touches == 0 && option->count() > 0)
+      problems.add_of_usage(describe_mismatch("simulate", option->get_name(), "--touches, which it is for", "none"));
+  problems.throw_if_any();
+}
+
 SimulationSettings settings_of(const SimulateOptions& o) {
   SimulationSettings s;
   s.scene = scene_of(o.scene);
@@ -97,9 +110,6 @@ SimulationSettings settings_of(const SimulateOptions& o) {
     network.sharpness = o.sharpness;
     network.class_share = class_shares(s.scene, s.trajectory, s.camera, s.label_set);
     s.network = std::move(network);
-  } else if (o.top > 0) {
-    throw CLI::ValidationError(
-        describe_mismatch("simulate", "--top", "a --network that gives probabilities", "--network none"));
   }
   if (!o.properties.empty()) s.properties = read_properties(o.properties);
   s.touches = {o.touches, o.touch_sigma, o.seed};
@@ -142,6 +152,7 @@ void warn_of_touches(const SimulationSettings& s) {
 int run_simulate(const SimulateOptions& o) {
   if (o.list) return list_scenes(o);
   if (o.scene.empty() || o.out.empty()) throw CLI::RequiredError(o.scene.empty() ? "SCENE" : "--out");
+  check(o);
   const SimulationSettings settings = settings_of(o);
   warn_of_touches(settings);
   const InterruptGuard interrupt;
@@ -229,6 +240,8 @@ void add_simulate(CLI::App& app) {
       ->check(CLI::IsMember({"png", "jpg"}))
       ->capture_default_str();
   command.add_flag("--no-mesh", o.no_mesh, "Leave out mesh.ply");
+  for (const char* name : {"--errors", "--top", "--sharpness"}) o.of_network.push_back(command.get_option(name));
+  for (const char* name : {"--touch-sigma", "--touch-where"}) o.of_touches.push_back(command.get_option(name));
 }
 
 }  // namespace felt::apps

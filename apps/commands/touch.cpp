@@ -180,6 +180,20 @@ size_t repeated(const Map& map, const std::vector<TouchEffect>& effects) {
   return count;
 }
 
+/// Effects of readings that the map has at another time: rows by frame number, read without the recording's stamps.
+size_t repeated_at_another_time(const Map& map, const std::vector<TouchEffect>& effects) {
+  std::set<uint64_t> added;
+  for (const TouchEffect& effect : effects) added.insert(effect.id);
+  return size_t(std::count_if(effects.begin(), effects.end(), [&](const TouchEffect& effect) {
+    return std::any_of(map.touches.touches.begin(), map.touches.touches.end(), [&](const Touch& other) {
+      TouchRequest then = map.touches.find(effect.id)->request;
+      if (added.contains(other.id) || other.undone || then.stamp_s == other.request.stamp_s) return false;
+      then.stamp_s = other.request.stamp_s;
+      return same_reading(other.request, then);
+    });
+  }));
+}
+
 TouchRequest request_of(const TouchOptions& options, const Map& map) {
   TouchRequest request;
   request.stamp_s = options.stamp_s;
@@ -208,7 +222,7 @@ int run_touch(const TouchOptions& options) {
   out["dry_run"] = options.dry_run;
   int code = kDone;
   std::string said;
-  std::vector<TouchEffect> effects;
+  std::vector<TouchEffect> effects, timed_by_frame;
   if (!options.undo.empty() || !options.redo.empty()) {
     const bool undo = !options.undo.empty();
     const uint64_t id = of_command_line([&] { return id_of_text(undo ? options.undo : options.redo); });
@@ -230,6 +244,7 @@ int run_touch(const TouchOptions& options) {
         std::fprintf(stderr, "feltmap: error: %s: %s\n", where.c_str(), outcome.refused.c_str());
       } else {
         effects.push_back(*outcome.effect);
+        if (!opened && !outcome.touch.stamp_s) timed_by_frame.push_back(*outcome.effect);
       }
     }
     if (touches.empty()) {
@@ -248,6 +263,12 @@ int run_touch(const TouchOptions& options) {
   if (const size_t twice = repeated(map, effects); twice > 0)
     spdlog::warn("{} of {} touches repeat one that counts already (reading, place and time): they {} twice", twice,
                  effects.size(), options.dry_run ? "would count" : "count");
+  if (const size_t moved = repeated_at_another_time(map, timed_by_frame); moved > 0)
+    spdlog::warn(
+        "{} of {} touches say what one at another time says: numbers of frames are taken for seconds where no "
+        "--sequence "
+        "tells their times",
+        moved, effects.size());
   // Only what is done is said to be.
   if (options.json) {
     if (!options.at.empty()) out.update(effect_json(map, effects.front(), request.region));
@@ -295,7 +316,7 @@ void add_touch(CLI::App& app) {
                                              "Recording that --frame, or rows of --file with u and v, speak of");
   CLI::Option* pixel = command.add_option("--pixel", options->pixel,
                                           "u,v of the touch; with --region mask its region is the segment there");
-  pixel->delimiter(',')->expected(2)->needs(frame);
+  pixel->delimiter(',')->expected(2)->check(finite())->needs(frame);
   CLI::Option* masks =
       command.add_option("--masks", options->masks, "Folder of instance images or masks to take that segment from");
   masks->needs(sequence);

@@ -1,13 +1,18 @@
 #include "apps/options/camera_options.h"
 
+#include <spdlog/spdlog.h>
+
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
+#include <map>
+#include <string>
 #include <variant>
 
 #include "apps/options/problems.h"
+#include "apps/options/reading_options.h"
 #include "io/sequence/open_sequence.h"
 #include "io/sequence/pose_list.h"
+#include "io/sequence/skip_reasons.h"
 
 namespace felt::apps {
 
@@ -38,13 +43,18 @@ PinholeCamera camera_of(const CameraOptions& options) {
 
 Viewpoints read_viewpoints(const std::string& trajectory, const CameraOptions& options,
                            const SequenceOptions& reading) {
-  if (!std::filesystem::is_directory(trajectory)) return {camera_of(options), read_poses(trajectory)};
+  if (!names_sequence(trajectory)) return {camera_of(options), read_poses(trajectory), {}};
   const auto sequence = open_sequence(trajectory, reading);
-  Viewpoints views{sequence->info().camera, {}};
+  Viewpoints views{sequence->info().camera, {}, {}};
+  std::map<std::string, int64_t> skipped;
   for (int64_t i = 0; i < sequence->size(); ++i) {
     const ReadResult result = sequence->read(i);
-    if (const auto* frame = std::get_if<Frame>(&result)) views.T_world_camera.push_back(frame->T_world_camera);
+    if (const auto* frame = std::get_if<Frame>(&result))
+      views.T_world_camera.push_back(frame->T_world_camera), views.frames.push_back(frame->index);
+    else
+      ++skipped[std::get<SkippedFrame>(result).reason];
   }
+  if (!skipped.empty()) spdlog::warn("{}: frames that are no views: {}", trajectory, skipped_text(skipped));
   return views;
 }
 

@@ -26,10 +26,11 @@ PinholeCamera camera_of(const CameraOptions& options);
 struct Viewpoints {
   PinholeCamera camera;
   std::vector<Eigen::Isometry3d> T_world_camera;
+  std::vector<int64_t> frames;  ///< of a sequence: their numbers (`Frame::index`)
 };
 
-/// Of a recorded sequence (a folder): its camera and the poses of its readable frames, both as `reading` has them. Of a
-/// file with one pose a line: those, and the camera of `options`.
+/// Of a recorded sequence: its camera and the poses of its readable frames, both as `reading` has them; a warning
+/// counts the others. Of a file with one pose a line: those, and the camera of `options`.
 Viewpoints read_viewpoints(const std::string& trajectory, const CameraOptions& options, const SequenceOptions& reading);
 
 }  // namespace felt::apps

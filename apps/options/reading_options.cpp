@@ -9,6 +9,10 @@
 
 namespace felt::apps {
 
+bool names_sequence(const std::filesystem::path& path) {
+  return std::filesystem::is_directory(path) || path.extension() == ".sens" || path.extension() == ".bin";
+}
+
 void add_reading_options(CLI::App& command, ReadingArguments& a) {
   command.add_option("--format", a.format, "Layout: 7scenes, tum, replica, generic, ...")->group(kReadingGroup);
   command.add_option("--frames", a.frames, "Frames a:b:step in recorded order, counted from 0")->group(kReadingGroup);
@@ -38,7 +42,9 @@ void add_reading_options(CLI::App& command, ReadingArguments& a) {
       .add_option("--stamp-offset", a.stamp_offset, "Added to the stamps of poses: seconds, or frames where numbered")
       ->group(kReadingGroup);
   command.add_option("--labels", a.labels, "Folder of label images")->group(kReadingGroup);
-  command.add_option("--label-offset", a.label_offset, "Added to every label id")->group(kReadingGroup);
+  command.add_option("--label-offset", a.label_offset, "Added to every label id")
+      ->check(CLI::Range(-65535, 65535))
+      ->group(kReadingGroup);
   command
       .add_option("--probs", a.probs,
                   "Folder of class probability images (docs/datasets.md#labels), or of confidences beside --labels")

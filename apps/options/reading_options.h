@@ -10,6 +10,9 @@
 
 namespace felt::apps {
 
+/// Whether a path names a sequence and no other file: they are folders, but for containers and single scans.
+bool names_sequence(const std::filesystem::path& path);
+
 /// How a sequence is to be read, in the command line's own words: shared by reconstruct, doctor, info and convert. What
 /// is left empty is found in the sequence or is the layout's default.
 struct ReadingArguments {

@@ -97,6 +97,8 @@ std::optional<ViewMask> RegionOptions::view() const {
     throw CLI::ValidationError(
         describe_mismatch("--mask, --intrinsics, --pose", "region", "--region mask", "--region " + rule));
   if (rule != "mask") return std::nullopt;
+  if (intrinsics.size() == 5)
+    throw CLI::ValidationError(describe_mismatch("--intrinsics", "camera of the mask", "4 or 6 numbers", "5"));
   if (mask.empty() || (intrinsics.size() != 4 && intrinsics.size() != 6) || pose.size() != 16)
     throw CLI::ValidationError(
         describe_mismatch("--region mask", "view", "--mask, --intrinsics and --pose", "not all of them"));

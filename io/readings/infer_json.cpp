@@ -137,7 +137,8 @@ ordered_json answer(const InferRequest& in, InferPrecision precision) {
 InferAnswer infer_json_line(std::string_view line, size_t number_of_line, InferPrecision precision) {
   try {
     return {answer(parse_infer_request(line), precision).dump(), false};
-  } catch (const Error& e) {
+  } catch (const std::exception& e) {
+    // Whatever is wrong with this line, also numbers that no function has a value for: the others are answered.
     const ordered_json error{{"error", e.what()}, {"line", number_of_line}};
     return {json_text(error), true};
   }

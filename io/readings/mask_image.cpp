@@ -1,11 +1,11 @@
 #include "io/readings/mask_image.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <span>
 #include <string>
 
 #include "core/pose.h"
+#include "core/text.h"
 #include "io/files/text_input.h"
 #include "io/images/image_decode.h"
 #include "io/sequence/camera_file.h"
@@ -34,11 +34,7 @@ Image<uint8_t> set_pixels(const std::filesystem::path& file) {
 ViewMask read_view_mask(const std::filesystem::path& file, const std::vector<double>& intrinsics,
                         const std::vector<double>& pose) {
   const Image<uint8_t> image = set_pixels(file);
-  const auto size_text = [](double w, double h) {
-    char text[64];
-    std::snprintf(text, sizeof text, "%.0f x %.0f", w, h);
-    return std::string(text);
-  };
+  const auto size_text = [](double w, double h) { return number_text(w) + " x " + number_text(h); };
   if (intrinsics.size() == 6 && (intrinsics[4] != image.width() || intrinsics[5] != image.height()))
     throw FormatError(describe_mismatch(file.string(), "size of the mask",
                                         size_text(intrinsics[4], intrinsics[5]) + " as its camera",

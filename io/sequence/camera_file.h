@@ -8,6 +8,9 @@
 namespace felt {
 
 /// What a calibration file says; sizes and scale are 0 where it is silent.
+/// Begins the camera file of a recording whose colour lies on the grid of depth, where its layout would not have it so.
+inline constexpr const char* kRegisteredMark = "# colour lies on the grid of depth";
+
 struct CameraFile {
   Intrinsics intrinsics;
   int width = 0, height = 0;  ///< pixels

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
+#include <set>
 
 #include "core/error.h"
 #include "core/text.h"
@@ -12,6 +14,7 @@
 #include "io/images/depth_encode.h"
 #include "io/images/image_encode.h"
 #include "io/images/label_images.h"
+#include "io/sequence/camera_file.h"
 #include "io/sequence/skip_reasons.h"
 #include "io/tables/class_table_file.h"
 
@@ -27,6 +30,9 @@ struct FileNames {
   bool counts_from_zero;
   const char *depth, *color, *labels, *probabilities, *instances, *pose;
 };
+
+/// From here on the numbers of `generic`'s poses are stamps (layouts/generic.cpp).
+constexpr double kLeastMoment = 1e9;
 
 constexpr FileNames kLayouts[] = {
     {"generic", 0, true, false, "depth/%06lld.png", "color/%06lld", "labels/%06lld.png", "probs/%06lld.png",
@@ -140,7 +146,7 @@ public:
     ++result.written;
   }
 
-  void finish() {
+  void finish(ConvertResult& result) {
     const PinholeCamera& c = info_.camera;
     const std::string fx = number(c.fx), fy = number(c.fy), cx = number(c.cx), cy = number(c.cy),
                       width = std::to_string(c.width), height = std::to_string(c.height), scale = number(depth_scale_);
@@ -154,6 +160,9 @@ public:
                                (info_.voxel_size_m > 0 ? "voxel_size: " + number(info_.voxel_size_m) + "\n" : "") +
                                (info_.max_depth_m > 0 ? "max_depth: " + number(info_.max_depth_m) + "\n" : ""));
       put("poses.txt", numbered_text());
+      if (!has_moments() && std::any_of(numbered_.begin(), numbered_.end(),
+                                        [](const NumberedPose& p) { return p.stamp_s != double(p.number); }))
+        result.left_out.emplace_back("stamps");
     } else if (layout == "tum") {
       put("depth.txt", "# timestamp filename\n" + depth_list_);
       put("rgb.txt", "# timestamp filename\n" + color_list_);
@@ -172,7 +181,8 @@ public:
                                 ", 0, 0, 0, " + fy + ", 0, " + cx + ", " + cy + ", 1]" +
                                 (other_scale ? ", \"depth_scale\": " + scale : "") + "}\n");
     } else {
-      put(layout == "7scenes" ? "camera-intrinsics.txt" : "intrinsics.txt", rows);
+      put(layout == "7scenes" ? "camera-intrinsics.txt" : "intrinsics.txt",
+          (layout == "7scenes" ? std::string(kRegisteredMark) + "\n" : "") + rows);
     }
     if (!info_.classes.empty()) put("classes.yaml", class_table_yaml(info_.classes));
   }
@@ -189,7 +199,10 @@ public:
         result.left_out.push_back(file.filename().string());
     };
     copy(info_.properties_file, "properties.yaml", generic);
-    copy(info_.touches_file, "touches.csv", generic && !from_zero_);
+    if (!generic || from_zero_ || info_.touches_file.empty()) return copy(info_.touches_file, "touches.csv", false);
+    int64_t elsewhere = 0;
+    put("touches.csv", touches_text(info_.touches_file, elsewhere));
+    if (elsewhere > 0) result.left_out.push_back(std::to_string(elsewhere) + " touches of frames that are not written");
   }
 
   /// Stored units per metre.
@@ -207,10 +220,57 @@ private:
     write_bytes(path, {bytes.begin(), bytes.end()});
   }
 
+  /// Whether stamps are told from frame numbers when they are read again: by a fraction, or by their size.
+  bool has_moments() const {
+    return std::any_of(numbered_.begin(), numbered_.end(), [](const NumberedPose& p) {
+      return p.stamp_s != std::floor(p.stamp_s) || p.stamp_s >= kLeastMoment;
+    });
+  }
+
+  /// The rows of touches whose frame is written, and the header; counts the others.
+  std::string touches_text(const fs::path& file, int64_t& elsewhere) const {
+    const bool moments = has_moments();
+    double first = std::numeric_limits<double>::infinity(), last = -first;
+    std::set<int64_t> numbers;
+    for (const NumberedPose& p : numbered_) {
+      numbers.insert(p.number);
+      const double stamp_s = moments ? p.stamp_s : double(p.number);
+      first = std::min(first, stamp_s), last = std::max(last, stamp_s);
+    }
+    const auto is_written = [&](const std::string& cell, bool is_number) {
+      constexpr double kRoundingS = 1e-6;  // stamps are written with as many digits
+      if (is_number) {
+        const auto frame = parse_integer(cell);
+        return frame && numbers.contains(*frame);
+      }
+      const auto stamp_s = parse_number(cell);
+      return stamp_s && *stamp_s >= first - kRoundingS && *stamp_s <= last + kRoundingS;
+    };
+    const std::string content = read_whole_file(file);
+    std::string text;
+    std::vector<std::string> header;
+    char separator = ',';
+    for (LineReader lines(content, file.string()); lines.next();) {
+      if (header.empty()) separator = csv_separator(lines.line());
+      const std::vector<std::string> cells = csv_cells(lines.line(), separator);
+      bool written = true;
+      if (header.empty())
+        header = cells;
+      else
+        for (size_t i = 0; i < std::min(cells.size(), header.size()); ++i)
+          if ((header[i] == "frame" || header[i] == "stamp") && !cells[i].empty())
+            written &= is_written(cells[i], header[i] == "frame");
+      if (written)
+        text += std::string(lines.line()) + "\n";
+      else
+        ++elsewhere;
+    }
+    return text;
+  }
+
   /// A pose a line, by the moment if there are moments: whole numbers would be taken for frame numbers.
   std::string numbered_text() const {
-    const bool moments = std::any_of(numbered_.begin(), numbered_.end(),
-                                     [](const NumberedPose& p) { return p.stamp_s != std::floor(p.stamp_s); });
+    const bool moments = has_moments();
     std::string text;
     for (const NumberedPose& p : numbered_)
       text += (moments ? number(p.stamp_s) : std::to_string(p.number)) + " " + p.matrix + "\n";
@@ -289,7 +349,7 @@ ConvertResult convert_sequence(const SequenceReader& reader, const fs::path& out
         "most of it from 1 to 65534 units, up to " + short_number(65534 / writer.depth_scale()) + " m",
         std::to_string(result.depth_out_of_range) + " of " + std::to_string(result.depth_measured) +
             " measured pixels outside; --written-depth-scale says another scale, in a layout that can state it"));
-  writer.finish();
+  writer.finish(result);
   writer.add_tables(result);
   folder.commit();
   return result;

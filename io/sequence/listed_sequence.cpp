@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <tuple>
+#include <utility>
 
 #include "core/error.h"
 #include "io/files/text_input.h"
@@ -155,11 +157,14 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
 }
 
 void ListedSequence::find_camera(const fs::path& path) {
-  // The first depth image that can be read tells the size of all.
+  // The size that most of the first depth images have that can be read; the camera's, where one of them has that.
+  constexpr int kAsked = 9;
   std::string last_fault = "no depth image";
+  std::vector<std::pair<int, int>> sizes;
   int width = 0, height = 0;
+  const auto votes = [&](std::pair<int, int> size) { return std::count(sizes.begin(), sizes.end(), size); };
   for (const FrameRecord& frame : listing_.frames) {
-    if (width > 0) break;
+    if (width > 0 || sizes.size() == kAsked) break;
     if (frame.depth.empty()) {
       if (!frame.fault_detail.empty()) last_fault = frame.fault_detail;
       continue;
@@ -171,19 +176,25 @@ void ListedSequence::find_camera(const fs::path& path) {
     try {
       const std::string bytes = read_source(frame.depth, "depth");
       const ImageHeader header = read_image_header(as_bytes(bytes), frame.depth.path.string());
-      width = header.width, height = header.height;
+      sizes.emplace_back(header.width, header.height);
     } catch (const Skip& skip) {
       last_fault = skip.detail;
     } catch (const ImageError& fault) {
       last_fault = fault.what();
     }
   }
+  if (!sizes.empty()) {
+    std::pair size = *std::max_element(sizes.begin(), sizes.end(),
+                                       [&](const auto& a, const auto& b) { return votes(a) < votes(b); });
+    if (const std::pair stated{listing_.width, listing_.height}; votes(stated) > 0) size = stated;
+    std::tie(width, height) = size;
+  }
   if (width == 0)
     throw FormatError(describe_mismatch(path.string(), "depth images", "at least one that can be read", last_fault));
   if (listing_.width > 0 && (listing_.width != width || listing_.height != height))
     throw FormatError(describe_mismatch(path.string(), "image size",
                                         size_text(listing_.width, listing_.height) + " as the camera says",
-                                        size_text(width, height) + " in the first depth image"));
+                                        size_text(width, height) + " in the first depth images"));
   const Intrinsics k = listing_.intrinsics.value_or(Intrinsics{});
   info_.camera = {k.fx, k.fy, k.cx, k.cy, width, height};
   check_camera_fits_image(info_.camera, path.string(), listing_.lacking_camera_file);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
 
 #include "core/error.h"
 #include "io/files/atomic_file.h"
@@ -37,10 +39,18 @@ std::string formatted(const char* format, Values... values) {
   return text;
 }
 
-/// Whether `folder` may make place: empty, or a simulated sequence.
-bool replaceable(const fs::path& folder) {
-  return fs::is_directory(folder) &&
-         (fs::is_empty(folder) || (fs::exists(folder / "sequence.yaml") && fs::exists(folder / "scene.json")));
+/// What keeps `folder` from making place; empty where it is empty, or a simulated sequence and nothing else.
+std::string in_the_way(const fs::path& folder) {
+  if (!fs::is_directory(folder)) return "something that is no folder";
+  if (fs::is_empty(folder)) return "";
+  if (!fs::exists(folder / "sequence.yaml") || !fs::exists(folder / "scene.json")) return "another folder";
+  static const std::set<std::string> kWritten = {
+      "classes.yaml", "color", "confusion.csv",   "depth",      "instances",     "labels",      "mesh.ply",
+      "poses.txt",    "probs", "properties.yaml", "scene.json", "sequence.yaml", "touches.csv", "truth"};
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (const std::string name = entry.path().filename().string(); !kWritten.contains(name))
+      return "one with '" + name + "', which no simulation wrote";
+  return "";
 }
 
 std::string sequence_yaml(const SimulationSettings& s, const std::string& root, const std::string& labels,
@@ -138,11 +148,13 @@ bool write_sequence(const SimulationSettings& s, const fs::path& out, bool repla
                     const std::function<bool(int64_t)>& progress) {
   const ClassTable& classes = s.label_set == LabelSet::semantic ? s.scene.semantics : s.scene.materials;
   const char* set_name = s.label_set == LabelSet::semantic ? "semantic" : "material";
-  if (fs::exists(out) && !(replace && replaceable(out)))
+  if (fs::exists(out) && !replace)
     throw IoError(describe_mismatch(out.string(), "output",
-                                    replace ? "an empty folder or a simulated sequence to replace"
-                                            : "a path that does not exist (--force replaces a simulated sequence)",
+                                    "a path that does not exist (--force replaces a simulated sequence)",
                                     "something that exists"));
+  if (const std::string other = fs::exists(out) ? in_the_way(out) : ""; !other.empty())
+    throw IoError(
+        describe_mismatch(out.string(), "output", "an empty folder or a simulated sequence to replace", other));
   FolderInProgress folder(out);
   const fs::path& root = folder.path();
   for (const char* part : {"color", "depth", "labels", "instances", "truth/semantic", "truth/material"})

@@ -260,6 +260,8 @@ Region find_region(const Map& map, const ViewMask& view, const RegionSettings& s
   if (region.empty()) throw TouchError("region mask: expected pixels that see the map, found none");
   if (contact != nullptr && !region.contains(contact->voxel))
     throw TouchError("region mask: expected the contact inside the mask, found it outside");
+  if (contact != nullptr && std::isfinite(settings.radius_m))
+    region = within_geodesic(region, contact->voxel, settings.radius_m / vs);
   return region;
 }
 

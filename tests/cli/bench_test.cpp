@@ -24,9 +24,12 @@ TEST_CASE("bench times a sequence at each voxel size and says what the map holds
 
 TEST_CASE("bench refuses a voxel size that is none") {
   const std::string room = (source_dir() / "data/scenes/room").string();
-  const CommandResult result = run_feltmap("bench '" + room + "' --voxel-sizes 0");
-  CHECK(result.exit_code == 3);
-  CHECK_THAT(result.err, Catch::Matchers::Contains("--voxel-sizes"));
+  for (const char* size : {"0", "inf", "nan"}) {
+    const CommandResult result = run_feltmap("bench '" + room + "' --voxel-sizes " + size);
+    INFO(size);
+    CHECK(result.exit_code == 2);
+    CHECK_THAT(result.err, Catch::Matchers::Contains("--voxel-sizes"));
+  }
 }
 
 }  // namespace felt::test

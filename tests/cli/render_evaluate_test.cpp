@@ -374,13 +374,22 @@ TEST_CASE("evaluate looks at the frames that were asked for and says which optio
   CHECK(seen("--frames 0:1") < all);
   const std::string poses = (folder.path() / "poses.txt").string();
   std::ofstream(poses) << "0 0 0 0 0 0 1\n";
-  for (const std::string& idle : {std::string("--frames 0:1"), std::string("--format tum"),
-                                  std::string("--properties x.yaml"), "--trajectory " + poses}) {
+  for (const std::string& idle :
+       {std::string("--frames 0:1"), std::string("--format tum"), std::string("--properties x.yaml"),
+        "--trajectory " + poses, std::string("--labels x"), std::string("--classes x"), std::string("--size 10x10")}) {
     INFO(idle);
     const CommandResult refused = run_feltmap("evaluate " + map + " --reference-mesh " + reference + " " + idle);
     CHECK(refused.exit_code == 2);
     CHECK_THAT(refused.err, Contains(idle.substr(0, 6)));
   }
+  const std::string picture = (folder.path() / "o.png").string();
+  for (const char* idle : {"--images class", "--max-depth 3", "--size 10x10", "--colored"}) {
+    INFO(idle);
+    const CommandResult refused = run_feltmap("render " + map + " --overview " + picture + " " + idle);
+    CHECK(refused.exit_code == 2);
+    CHECK_THAT(refused.err, Contains(std::string(idle).substr(0, 6)));
+  }
+  CHECK_FALSE(std::filesystem::exists(picture));
 }
 
 }  // namespace felt::test

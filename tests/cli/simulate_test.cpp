@@ -86,6 +86,12 @@ TEST_CASE("simulate replaces an earlier simulation only when told, and nothing e
   CHECK(run_feltmap(kSmall + quoted(mine) + " --force").exit_code == 4);
   CHECK(files_of(mine).at("thesis.txt") == "years of work");
   CHECK(std::distance(fs::directory_iterator(directory.path()), fs::directory_iterator()) == 2);
+  // Not even what somebody put beside an earlier one.
+  std::ofstream(out / "notes.txt") << "mine";
+  const auto kept = run_feltmap(kSmall + quoted(out) + " --force");
+  CHECK(kept.exit_code == 4);
+  CHECK_THAT(kept.err, Catch::Contains("notes.txt"));
+  CHECK(fs::exists(out / "notes.txt"));
 }
 
 TEST_CASE("what simulate cannot do is refused with the reason and its exit code, and leaves nothing") {
@@ -104,7 +110,9 @@ TEST_CASE("what simulate cannot do is refused with the reason and its exit code,
   expect("castle" + out, 3, "room1");
   expect("boxes --network perfect" + out, 3, "'perfect'");
   expect("boxes --top 3" + out, 2, "--network");
-  expect("boxes --touch-where mistaken" + out, 2, "--labels material");
+  expect("boxes --touches 1 --touch-where mistaken" + out, 2, "--labels material");
+  for (const char* idle : {"--errors pixel", "--sharpness 3", "--touch-sigma 1", "--touch-where anywhere"})
+    expect("boxes " + std::string(idle) + out, 2, std::string(idle).substr(0, std::string(idle).find(' ')));
   expect("boxes --network nowhere.csv" + out, 4, "nowhere.csv");
   expect("nowhere.yaml" + out, 4, "nowhere.yaml");
   expect("boxes --out" + quoted(directory.path() / "missing" / "out"), 4, "missing");

@@ -349,6 +349,13 @@ TEST_CASE("a force log pressed on the map becomes a touch of it") {
   CHECK(answer["kinetic"]["mean"].get<double>() == Approx(0.139).epsilon(0.03));
   CHECK(answer["static"]["peak"].get<double>() > 0.16);
   CHECK(answer["normal"][2].get<double>() == Approx(1).epsilon(1e-6));
+  // Recorded touches are not replaced by the way.
+  const std::string again =
+      "friction " + (source_dir() / "data/friction_log.csv").string() + " --at=-0.2,0,0 --touch " + touches;
+  const CommandResult kept = run_feltmap(again);
+  CHECK(kept.exit_code == 4);
+  CHECK_THAT(kept.err, Catch::Contains("--force"));
+  CHECK(run_feltmap(again + " --force --cutoff 0").exit_code == 2);
   const json touched = ask("touch " + map + " --file " + touches)["touches"][0];
   CHECK(touched["after"]["class"] == "ice");
   CHECK(touched["sigma"] == Approx(answer["kinetic"]["sd"].get<double>()).epsilon(0.01));
@@ -386,6 +393,10 @@ TEST_CASE("touches that the map has already are applied, with a warning that the
   CHECK(again.exit_code == 0);
   CHECK_THAT(again.err, Catch::Contains("2 of 2 touches repeat"));
   CHECK(load_map(map).touches.touches.size() == 4);
+  // Numbers of frames say nothing of when a touch was, if the map's touches have stamps.
+  write_file_atomically(csv, "frame,x,y,z,property,value\n7,-0.2,0,0,friction,0.17\n");
+  CHECK_THAT(run_feltmap("touch " + map + " --dry-run --file " + csv).err,
+             Catch::Contains("1 of 1 touches say what one at another time says"));
   // Within a file the first of equal rows repeats nothing; a dry run counts nothing.
   write_file_atomically(csv, "stamp,x,y,z,property,value\n3,-0.2,0,0,friction,0.17\n3,-0.2,0,0,friction,0.17\n");
   CHECK_THAT(run_feltmap("touch " + map + " --dry-run --file " + csv).err,

@@ -61,10 +61,22 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
   // by position where numbers have gaps that the log does not know. Colour alone is no frame.
   const int64_t first = listing.frames.empty() ? 0 : listing.frames.front().index;
   std::erase_if(listing.frames, [](const FrameRecord& frame) { return frame.depth.empty(); });
-  const bool by_number = std::all_of(listing.frames.begin(), listing.frames.end(),
-                                     [&](const FrameRecord& frame) { return pose_at.contains(frame.index - first); });
+  const auto all_have_poses = [&](int64_t before) {
+    return std::all_of(listing.frames.begin(), listing.frames.end(),
+                       [&](const FrameRecord& frame) { return pose_at.contains(frame.index - before); });
+  };
+  // A log that ends with the last image's own number is of the same count: images before the first are missing.
+  const bool same_count = all_have_poses(0) && !pose_at.empty() && !listing.frames.empty() &&
+                          pose_at.rbegin()->first == listing.frames.back().index;
+  const int64_t before = same_count ? 0 : first;
+  const bool by_number = all_have_poses(before);
+  if (!same_count && first > 0 && by_number && pose_at.size() != listing.frames.size())
+    listing.notes.push_back("the first depth image has number " + std::to_string(first) +
+                            " and is taken for pose 0 of " + log.filename().string() + ", which has " +
+                            std::to_string(pose_at.size()) + " poses for " + std::to_string(listing.frames.size()) +
+                            " images");
   for (size_t i = 0; i < listing.frames.size(); ++i) {
-    const auto found = pose_at.find(by_number ? listing.frames[i].index - first : int64_t(i));
+    const auto found = pose_at.find(by_number ? listing.frames[i].index - before : int64_t(i));
     if (found != pose_at.end()) listing.frames[i].pose = found->second;
   }
   if (!by_number && pose_at.size() != listing.frames.size())

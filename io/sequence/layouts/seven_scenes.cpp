@@ -1,4 +1,7 @@
+#include <cmath>
+
 #include "core/error.h"
+#include "io/files/text_input.h"
 #include "io/sequence/camera_file.h"
 #include "io/sequence/layouts.h"
 #include "io/sequence/layouts/file_names.h"
@@ -12,6 +15,7 @@ namespace {
 const std::vector<std::string> kColor = {".color.png", ".color.jpg", ".color.jpeg"}, kPose = {".pose.txt"},
                                kLabels = {".segm.png", ".label.png"};
 constexpr const char *kPrefix = "frame-", *kDepth = ".depth";
+constexpr Intrinsics kDepthCamera = {585, 585, 320, 240};
 
 /// The folder that holds the frames: `path` or its only `seq-*`.
 fs::path frame_folder(const fs::path& path) {
@@ -25,6 +29,26 @@ fs::path frame_folder(const fs::path& path) {
     throw FormatError(describe_mismatch(path.string(), "sequence", "one folder seq-*; name the one to read",
                                         std::to_string(sequences.size()) + " of them"));
   return sequences.empty() ? fs::path() : sequences.front();
+}
+
+/// Whether the camera's file says that colour lies on the grid of depth (`convert` writes it so).
+bool says_registered(const fs::path& camera) {
+  return !camera.empty() && read_whole_file(camera).starts_with(kRegisteredMark);
+}
+
+bool is_depth_camera(const Intrinsics& k) {
+  return k.fx == kDepthCamera.fx && k.fy == kDepthCamera.fy && k.cx == kDepthCamera.cx && k.cy == kDepthCamera.cy;
+}
+
+/// Whether a camera that was said is that of the recording's file, the depth camera of 7-Scenes, with a focal length
+/// that was measured better.
+bool refines(const Intrinsics& said, const fs::path& camera) {
+  if (camera.empty() || std::abs(said.fx / kDepthCamera.fx - 1) > 0.1) return false;
+  try {
+    return is_depth_camera(read_camera_file(camera).intrinsics);
+  } catch (const FormatError&) {
+    return false;  // the user says another because of it
+  }
 }
 
 bool recognises(const fs::path& path) {
@@ -48,12 +72,14 @@ SequenceListing list(const fs::path& path, const SequenceOptions& options) {
     if (!camera.empty()) {
       listing.intrinsics = read_camera_file(camera).intrinsics;
     } else {
-      assume_camera({585, 585, 320, 240}, "camera-intrinsics.txt", "the depth camera of 7-Scenes", listing);
+      assume_camera(kDepthCamera, "camera-intrinsics.txt", "the depth camera of 7-Scenes", listing);
     }
   }
   // Microsoft's recordings: depth is not registered to colour, whose camera has another focal length. How the cameras
   // lie to each other was not published; a few pixels are left.
-  if (const auto& k = listing.intrinsics; k && k->fx == 585 && k->fy == 585 && k->cx == 320 && k->cy == 240)
+  const Intrinsics depth_camera = options.intrinsics ? *options.intrinsics : *listing.intrinsics;
+  if ((is_depth_camera(depth_camera) || (options.intrinsics && refines(*options.intrinsics, camera))) &&
+      !says_registered(camera))
     listing.color_intrinsics = Intrinsics{525, 525, 320, 240};
   for (const fs::path& place : {folder, above})
     if (const fs::path table = first_existing(place, {"classes.yaml"}); !table.empty() && listing.classes.empty())

@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "io/files/text_input.h"
 #include "io/images/depth_encode.h"
+#include "io/images/image_encode.h"
 #include "io/sequence/open_sequence.h"
 #include "tests/support/data.h"
 #include "tests/support/recorded_sequence.h"
@@ -52,6 +53,15 @@ TEST_CASE("a conversion keeps the property table and the touches, or says that i
   const auto converted = open_sequence(folder.path() / "generic");
   CHECK(converted->info().properties_file == folder.path() / "generic" / "properties.yaml");
   CHECK(read_whole_file(converted->info().touches_file) == read_whole_file(original->info().touches_file));
+  // Of frames that are not written there can be no touches.
+  write_text(folder.path() / "recording" / "touches.csv",
+             "frame,x,y,z,property,value\n0,0,0,1,friction,0.2\n1,0,0,1,friction,0.3\n");
+  const ConvertResult part =
+      convert_sequence(*open_sequence(folder.path() / "recording", {.frames = {0, 1, 1}}), folder.path() / "part", {});
+  CHECK(part.left_out == std::vector<std::string>{"1 touches of frames that are not written"});
+  CHECK(read_whole_file(folder.path() / "part" / "touches.csv") ==
+        "frame,x,y,z,property,value\n0,0,0,1,friction,0.2\n");
+  write_text(folder.path() / "recording" / "touches.csv", "frame,x,y,z,property,value\n0,0,0,1,friction,0.2\n");
   const ConvertResult lost = convert_sequence(*original, folder.path() / "tum", {.layout = "tum"});
   CHECK(lost.left_out == std::vector<std::string>{"labels", "properties.yaml", "touches.csv"});
   CHECK_THROWS_AS(convert_sequence(*original, folder.path() / "fine", {.depth_scale = 1e9}), ConfigError);
@@ -86,6 +96,47 @@ TEST_CASE("a conversion keeps stamps where the layout has a place for them, or s
   }
   CHECK(convert_sequence(*reader, folder.path() / "icl", {.layout = "icl"}).left_out ==
         std::vector<std::string>{"depth steps finer than 1 mm", "stamps"});
+}
+
+TEST_CASE("stamps in whole seconds are kept") {
+  TemporaryDirectory folder;
+  const fs::path recording = folder.path() / "recording";
+  write_generic(recording, 3);
+  std::string poses;
+  for (int i = 0; i < 3; ++i)
+    poses += std::to_string(1700000000 + 2 * i) + " " + matrix_text(pose_at(i).matrix(), " ") + "\n";
+  write_text(recording / "poses.txt", poses);
+  const auto reader = open_sequence(recording);
+  REQUIRE(reader->name(1).stamp_s == 1700000002);
+  CHECK(convert_sequence(*reader, folder.path() / "kept", {}).left_out.empty());
+  CHECK(open_sequence(folder.path() / "kept")->name(2).stamp_s == 1700000004);
+}
+
+TEST_CASE("colour that a conversion registered to depth is not registered again") {
+  TemporaryDirectory folder;
+  const fs::path recording = folder.path() / "recording";
+  constexpr int kWide = 640, kHigh = 480;
+  fs::create_directories(recording / "seq-01");
+  Image<Rgba8> colors(kWide, kHigh);
+  for (int v = 0; v < kHigh; ++v)
+    for (int u = 0; u < kWide; ++u) colors(u, v) = {uint8_t(u / 3), uint8_t(v / 2), 7, 255};
+  write_bytes(recording / "seq-01" / "frame-000000.color.png", encode_png(colors));
+  write_bytes(recording / "seq-01" / "frame-000000.depth.png", encode_png(Image<uint16_t>(kWide, kHigh, 1500)));
+  write_text(recording / "seq-01" / "frame-000000.pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+  const auto original = open_sequence(recording);
+  const Frame frame = frame_of(*original, 0);
+  CHECK(frame.color(100, 100).r != colors(100, 100).r);  // through another camera
+  convert_sequence(*original, folder.path() / "converted", {.layout = "7scenes"});
+  const Frame again = frame_of(*open_sequence(folder.path() / "converted"), 0);
+  // Nor is a camera that is said another reason to take colour as it lies.
+  const Frame said = frame_of(*open_sequence(recording, {.intrinsics = Intrinsics{585, 585, 320, 240}}), 0);
+  const Frame refined = [&] {
+    write_text(recording / "camera-intrinsics.txt", "585 0 320\n0 585 240\n0 0 1\n");
+    return frame_of(*open_sequence(recording, {.intrinsics = Intrinsics{580, 580, 320, 240}}), 0);
+  }();
+  CHECK(refined.color(60, 60).r != colors(60, 60).r);
+  for (const Frame* other : {&again, &said})
+    for (const int at : {60, 100, 240, 400}) CHECK(other->color(at, at).r == frame.color(at, at).r);
 }
 
 TEST_CASE("another depth scale is stated where the layout can state one, and refused where it cannot") {

@@ -314,6 +314,26 @@ TEST_CASE("a negative fy is refused with what to do about it") {
   CHECK(matrix_of_translation_quaternion(n).isApprox(M * T.matrix() * M, 1e-12));
 }
 
+TEST_CASE("one image of another size does not speak for the others") {
+  TemporaryDirectory folder;
+  write_generic(folder.path() / "stated", 4);
+  write_seven_scenes(folder.path() / "unstated", 4);
+  fs::path first = folder.path() / "unstated";
+  for (const auto& entry : fs::recursive_directory_iterator(folder.path() / "unstated"))
+    if (entry.path().filename().string().find("000000.depth") != std::string::npos) first = entry.path();
+  for (const fs::path& image : {folder.path() / "stated" / "depth" / "0.png", first}) {
+    REQUIRE(fs::is_regular_file(image));
+    write_bytes(image, encode_png(Image<uint16_t>(12, 8, 1000)));
+  }
+  for (const char* name : {"stated", "unstated"}) {
+    INFO(name);
+    const auto reader = open_sequence(folder.path() / name);
+    CHECK(reader->info().camera.width == kWidth);
+    CHECK(skip_of(*reader, 0).reason == "wrong-size depth image");
+    CHECK(std::holds_alternative<Frame>(reader->read(1)));
+  }
+}
+
 TEST_CASE("sizes and numbers beyond all measure are refused, not cut") {
   TemporaryDirectory folder;
   write_redwood(folder.path(), 1);

@@ -77,6 +77,15 @@ TEST_CASE("a missing depth image shifts no pose of a log that counts frames") {
     const Frame frame = frame_of(*reader, i);
     CHECK(frame.T_world_camera.isApprox(pose_at(int(frame.index)), 1e-9));
   }
+  // The first images are no exception.
+  fs::remove(folder.path() / "depth" / "00000.png");
+  fs::remove(folder.path() / "color" / "00000.png");
+  const auto beheaded = open_sequence(folder.path());
+  for (int64_t i = 0; i < beheaded->size(); ++i)
+    CHECK(frame_of(*beheaded, i).T_world_camera.isApprox(pose_at(int(beheaded->name(i).index)), 1e-9));
+  CHECK(beheaded->info().notes.empty());
+  write_redwood(folder.path(), 5);
+  fs::remove(folder.path() / "depth" / "00002.png");
   // Every second image with a log of its own: by position.
   fs::remove(folder.path() / "depth" / "00001.png");
   fs::remove(folder.path() / "depth" / "00003.png");

@@ -268,6 +268,14 @@ TEST_CASE("an image mask selects what it sees and nothing behind it") {
   CHECK(seen.contains({0, 0, 25}));
   CHECK_FALSE(seen.contains({0, 0, 0}));
   CHECK(seen.contains({20, 0, 0}));
+  // A radius bounds it around the contact.
+  RegionSettings near = settings;
+  near.radius_m = 0.15;
+  const Contact beside = find_contact(map, {0.3, 0, 0}, settings);
+  const Region part = find_region(map, view, near, &beside);
+  CHECK(part.contains(beside.voxel));
+  CHECK(part.voxels() < find_region(map, view, settings, &beside).voxels() / 2);
+  CHECK_FALSE(part.contains({0, 0, 25}));
   for (int v = 0; v < 101; ++v)
     for (int u = 0; u < 50; ++u) view.mask(u, v) = 0;
   CHECK_FALSE(find_region(map, view, settings, nullptr).contains({-20, 0, 0}));
