@@ -19,6 +19,7 @@ constexpr double kNegligibleWeight = 1e-12;
 struct Support {
   std::vector<double> edge;  // ascending: panels no wider than the narrowest component they cross
   double lowest_dof = 0;
+  bool resolved = true;  // else a component is so narrow that doubles around its location do not tell its parts apart
 };
 
 Support support_of(const StudentTMixture& m) {
@@ -32,6 +33,8 @@ Support support_of(const StudentTMixture& m) {
     for (double z : {-30.0, -10.0, -4.0, -1.5, 0.0, 1.5, 4.0, 10.0, 30.0}) s.edge.push_back(t.location + z * scale);
     s.lowest_dof = std::min(s.lowest_dof, t.dof);
     narrowest = std::min(narrowest, scale);
+    constexpr double kLeastShare = 1e-12;
+    s.resolved &= scale > kLeastShare * std::abs(t.location);
   }
   std::sort(s.edge.begin(), s.edge.end());
   std::vector<double> kept;
@@ -97,6 +100,7 @@ Estimate integrate(const StudentTMixture& m, const std::function<double(double)>
     // The rule's own estimate is the difference to its embedded Gauss rule; rounding comes on top.
     total.error += panel.error + 1e-15 * std::abs(panel.value);
   }
+  if (!s.resolved) total.error = std::numeric_limits<double>::infinity();
   return total;
 }
 
@@ -120,7 +124,12 @@ Estimate information_gain(const StudentTMixture& predictive) {
     }
     return sum;
   });
-  gain.value = std::max(gain.value, 0.0);
+  // What a reading can teach about the class is what is not known about it.
+  double class_entropy = 0;
+  for (const double w : predictive.weight)
+    if (w > 0) class_entropy -= w * std::log(w);
+  gain.error = std::max(gain.error, gain.value - class_entropy);
+  gain.value = std::clamp(gain.value, 0.0, std::max(0.0, class_entropy));
   return gain;
 }
 

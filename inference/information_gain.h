@@ -6,7 +6,8 @@
 
 namespace felt {
 
-/// A number from quadrature and how far off it may be (absolute, not below the truth in any tested case).
+/// A number from quadrature and how far off it may be (absolute, not below the truth in any tested case; infinite where
+/// a component is narrower than 1e-12 of its location, which doubles do not resolve).
 struct Estimate {
   double value = 0;
   double error = 0;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/text.h"
+#include "mapping/regions/region_area.h"
 #include "mapping/regions/region_query.h"
 #include "mapping/regions/region_surface.h"
 
@@ -72,7 +73,6 @@ std::vector<size_t> piece_sizes(const Region& region) {
 
 /// What one block adds to the summary.
 struct Part {
-  double area_m2 = 0;
   Index3 lo, hi;
   std::vector<size_t> class_voxels;
   size_t unlabelled = 0, open = 0, boundary = 0;
@@ -92,10 +92,6 @@ Part examine(const Map& map, const Region& region, size_t b, const RegionSetting
     part.lo = {std::min(part.lo.x, v.x), std::min(part.lo.y, v.y), std::min(part.lo.z, v.z)};
     part.hi = {std::max(part.hi.x, v.x), std::max(part.hi.y, v.y), std::max(part.hi.z, v.z)};
     const Eigen::Vector3f normal = surface_normal(map, v, min_weight);
-    // A hat over the band's width sums to 1 across the surface wherever it runs between voxel centres.
-    const double hat = std::max(0.0, 1 - std::abs(double(block.geometry->tsdf[i])) / double(band_m));
-    part.area_m2 += hat * map.voxel_size_m * map.voxel_size_m / settings.band_voxels;
-
     float best = 0;
     int strongest = -1;
     for (const EvidencePlane& e : block.evidence) {
@@ -132,6 +128,7 @@ RegionSummary summarize(const Map& map, const Region& region, const RegionSettin
   const size_t k = size_t(map.classes.size());
   std::vector<Part> parts(region.blocks());
   tbb::parallel_for(size_t(0), region.blocks(), [&](size_t b) { parts[b] = examine(map, region, b, settings); });
+  out.area_m2 = surface_area_m2(map, region, settings);
   out.voxels = region.voxels();
   out.blocks = region.blocks();
   out.class_voxels.assign(k, 0);
@@ -143,7 +140,6 @@ RegionSummary summarize(const Map& map, const Region& region, const RegionSettin
     lo = lo.min(Eigen::Array3d(part.lo.x, part.lo.y, part.lo.z));
     hi = hi.max(Eigen::Array3d(part.hi.x, part.hi.y, part.hi.z));
     for (size_t c = 0; c < k; ++c) out.class_voxels[c] += part.class_voxels[c];
-    out.area_m2 += part.area_m2;
     out.unlabelled_voxels += part.unlabelled;
     out.boundary_voxels += part.boundary;
     open += part.open;

@@ -11,6 +11,7 @@
 #include "inference/class_posterior.h"
 #include "inference/information_gain.h"
 #include "mapping/regions/map_segments.h"
+#include "mapping/regions/region_area.h"
 #include "mapping/regions/region_surface.h"
 
 namespace felt {
@@ -37,17 +38,6 @@ Index3 middle_of(const Region& region) {
     if (d < best) best = d, nearest = v;
   });
   return nearest;
-}
-
-/// Area by the same hat over the band as `summarize`.
-double area_of(const Map& map, const Region& region, const RegionSettings& settings) {
-  const double band_m = settings.band_voxels * map.voxel_size_m;
-  double area = 0;
-  for (size_t b = 0; b < region.blocks(); ++b) {
-    const GeometryPlanes& g = *map.store.get(region.coord[b])->geometry;
-    for_each_bit(region.mask[b], [&](int i) { area += std::max(0.0, 1 - std::abs(double(g.tsdf[i])) / band_m); });
-  }
-  return area * map.voxel_size_m * map.voxel_size_m / settings.band_voxels;
 }
 
 std::vector<Outcome> outcomes_of(const StudentTMixture& next) {
@@ -138,7 +128,7 @@ std::vector<Suggestion> suggest_touches(const Map& map, const std::string& prope
     s.point_m = Eigen::Vector3d(middle.x, middle.y, middle.z) * map.voxel_size_m -
                 double(block.geometry->tsdf[offset_in_block(middle)]) * s.normal;
     s.voxels = region.voxels();
-    s.area_m2 = area_of(map, region, settings.region);
+    s.area_m2 = surface_area_m2(map, region, settings.region);
     s.gain_nat = information_gain(next).value;
     s.class_probability = belief.class_probability;
     s.outcomes = outcomes_of(next);

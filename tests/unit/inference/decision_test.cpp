@@ -77,6 +77,19 @@ TEST_CASE("information gain agrees with the difference of entropies within its o
   }
 }
 
+TEST_CASE("what doubles do not resolve has no claimed accuracy, and no gain is more than there is to learn") {
+  for (const double sd : {1e-17, 1e-20}) {
+    StudentTMixture m;
+    m.weight = {0.5, 0.5};
+    for (const double at : {0.4, 0.5}) m.component.push_back({at, sd * sd, 100});
+    const Estimate gain = information_gain(m);
+    CHECK(std::isinf(gain.error));
+    CHECK(gain.value >= 0);
+    CHECK(gain.value <= std::log(2.0) * (1 + 1e-15));
+    CHECK(std::isinf(entropy(m).error));
+  }
+}
+
 TEST_CASE("the entropy of a lone component is its closed form, also with heavy tails") {
   for (double dof : {0.2, 1.0, 4.0, 200.0}) {
     const StudentT t{-300, 25, dof};

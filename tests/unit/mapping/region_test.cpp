@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <random>
 #include <set>
 
+#include "mapping/regions/region_area.h"
 #include "mapping/regions/region_query.h"
 #include "tests/support/labelled_map.h"
 #include "tests/support/region_voxels.h"
@@ -307,6 +309,38 @@ TEST_CASE("unusable region settings are named all at once") {
   settings.class_ratio = NAN;
   CHECK_THROWS_WITH(validate(settings), Catch::Contains("band_voxels") && Catch::Contains("class_ratio") &&
                                             Catch::Contains("finite radius"));
+}
+
+TEST_CASE("area does not depend on how a surface lies to the grid, nor on what distance is measured along") {
+  // A square of 1 m, tilted and shifted against the grid; distances rise by `steepness` along the normal.
+  for (const double steepness : {1.0, 1.9})
+    for (const double tilt : {0.0, 0.3, 0.7})
+      for (const double shift_m : {0.0, 0.003, 0.0099}) {
+        INFO("steepness " << steepness << ", tilt " << tilt << ", shift " << shift_m);
+        const Eigen::AngleAxisd turn(tilt, Eigen::Vector3d(1, 2, 0).normalized());
+        const Eigen::Matrix3d to_plane = turn.toRotationMatrix().transpose();
+        const auto within = [&](const Eigen::Vector3d& p) {
+          const Eigen::Vector3d q = to_plane * p;
+          return std::abs(q.x()) < 0.5 && std::abs(q.y()) < 0.5;
+        };
+        const Map map = labelled_map(
+            kVoxel, {-0.9, -0.9, -0.7}, {0.9, 0.9, 0.7},
+            [&](const Eigen::Vector3d& p) { return steepness * ((to_plane * p).z() - shift_m); },
+            class_table({"floor"}), [&](const Eigen::Vector3d& p) { return within(p) ? 0 : -1; });
+        RegionSettings settings;
+        settings.band_voxels = 1;
+        std::map<BlockCoord, BlockMask> bits;
+        for (const Block& block : map.store.blocks())
+          for (int i = 0; i < kBlockVoxels; ++i) {
+            const Index3 v = voxel_at(block.coord, i);
+            if (std::abs(double(block.geometry->tsdf[i])) <= settings.band_voxels * kVoxel &&
+                within(kVoxel * Eigen::Vector3d(v.x, v.y, v.z)))
+              bits[block.coord].set(i);
+          }
+        Region square;
+        for (const auto& [coord, mask] : bits) square.append(coord, mask);
+        CHECK(surface_area_m2(map, square, settings) == Approx(1).epsilon(0.05));
+      }
 }
 
 TEST_CASE("a region's summary gives its area, extent and classes") {
