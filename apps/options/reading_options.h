@@ -28,6 +28,7 @@ struct ReadingArguments {
 /// Their group in the help.
 inline constexpr const char* kReadingGroup = "Sequence (found in it, or the layout's default, unless given)";
 
+/// Adds the options in that group.
 void add_reading_options(CLI::App& command, ReadingArguments& arguments);
 
 /// Lays what was given over `base` (a configuration file's settings, or defaults). Adds to `problems` what cannot be

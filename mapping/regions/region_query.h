@@ -62,8 +62,8 @@ Region find_region(const Map& map, const ViewMask& view, const RegionSettings& s
 /// What a region is made of, and signs that it is more than one surface.
 struct RegionSummary {
   size_t voxels = 0, blocks = 0;
-  double area_m2 = 0;            ///< of the surface (mapping/regions/region_area.h)
-  Eigen::Vector3d min_m, max_m;  ///< extent of the voxel centres, world
+  double area_m2 = 0;                ///< of the surface (mapping/regions/region_area.h)
+  Eigen::Vector3d min_m, max_m;      ///< extent of the voxel centres, world
   std::vector<size_t> class_voxels;  ///< by slot: voxels whose strongest class it is
   size_t unlabelled_voxels = 0;
   int necks = 0;                      ///< pieces of at least 5 % that two voxels of erosion leave, less one
