@@ -43,7 +43,7 @@ MixtureUpdate mixture_update(std::span<const double> a, std::span<const Nig> pri
   const std::vector<double>&r = result.responsibility.p, &not_r = result.responsibility.not_p;
 
   if (projection == Projection::kl) {
-    project_dirichlet_kl(a, r, result.a);
+    project_dirichlet_kl(a, r, not_r, result.a);
   } else {
     project_dirichlet_published(a, r, not_r, result.a);
   }

@@ -4,12 +4,16 @@
 #include <boost/math/special_functions/gamma.hpp>
 #include <boost/math/special_functions/trigamma.hpp>
 #include <cmath>
+#include <numbers>
 
 namespace felt {
 namespace {
 
 // From here on the asymptotic series below are exact to double precision (first omitted term < 3e-18 of the value).
 constexpr double kAsymptotic = 16.0;
+
+// Up to this relative step two points of Gauss and Legendre integrate trigamma to double precision.
+constexpr double kSmallStep = 3e-4;
 
 // Bernoulli numbers B_2 .. B_16 give all three series.
 constexpr double kB2 = 1.0 / 6, kB4 = -1.0 / 30, kB6 = 1.0 / 42, kB8 = -1.0 / 30, kB10 = 5.0 / 66, kB12 = -691.0 / 2730,
@@ -60,6 +64,10 @@ double inverse_log_minus_digamma(double s) {
 }
 
 double digamma_difference(double x, double delta) {
+  if (std::abs(delta) < kSmallStep * x) {
+    const double middle = x + delta / 2, half = delta / 2 / std::numbers::sqrt3;
+    return delta / 2 * (trigamma(middle - half) + trigamma(middle + half));
+  }
   return std::log1p(delta / x) - (log_minus_digamma(x + delta) - log_minus_digamma(x));
 }
 

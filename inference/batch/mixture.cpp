@@ -23,9 +23,8 @@ void run_kernel(const MixtureBatch& batch, size_t begin, size_t end, const Mixtu
                 std::vector<float>& scratch) {
   if (simd_scalar_forced()) return mixture_kernel_scalar(batch, begin, end, reading);
   mixture_kernel_simd(batch, begin, end, reading, scratch);
-  if (reading.noise_sd == 0) return;
   for (size_t voxel = begin; voxel < end; ++voxel)
-    if (batch.updated[voxel] == kTooNoisy) mixture_kernel_scalar(batch, voxel, voxel + 1, reading);
+    if (batch.updated[voxel] == kNeedsF64) mixture_kernel_scalar(batch, voxel, voxel + 1, reading);
 }
 
 /// Every state plane, concentrations first.

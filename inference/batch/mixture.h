@@ -35,7 +35,8 @@ struct MixtureBatch {
 /// One reading psi (noise of sd `noise_sd` >= 0, units of the property) applied in place to every selected voxel under
 /// the `mixture` model: responsibilities, NIG projection and Dirichlet projection (inference/mixture.h, mixture_update,
 /// is the f64 specification). Noise takes the tempered closed form; a voxel with a class for which that errs
-/// (inference/noise.h, needs_quadrature) is computed in f64, by quadrature, at a great multiple of the cost.
+/// (inference/noise.h, needs_quadrature) is computed in f64, by quadrature, at a great multiple of the cost. So is,
+/// with `kl`, a voxel whose concentrations sum in f32 to less than the largest of them and 1e-4.
 ///
 /// Voxels of equal state are computed once. Results do not depend on the order of voxels, on which other voxels are in
 /// the batch, or on the number of threads.

@@ -21,7 +21,7 @@ struct MixtureReading {
 enum : uint8_t {
   kRefused = 0,
   kUpdated = 1,
-  kTooNoisy = 2,  ///< some class may need quadrature (inference/noise.h, needs_quadrature)
+  kNeedsF64 = 2,  ///< some class may need quadrature (inference/noise.h, needs_quadrature), or one holds nearly all
 };
 
 /// Voxels [begin, end) of `batch`, both multiples of kBatchLanes. Does not look at `selected`; `updated` must be given.

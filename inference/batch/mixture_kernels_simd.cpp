@@ -33,7 +33,7 @@ public:
   HWY_INLINE void update(size_t voxel) {
     read_as_each_class(voxel);
     weigh();
-    writable_ = pair::AndNot(too_noisy_, usable_);
+    writable_ = pair::AndNot(needs_f64_, usable_);
     all_writable_ = pair::AllTrue(writable_);
     DirichletStart start;
     const DirichletRows rows{row(kA), row(kWeight), row(kNotR), row(kStep), row(kShare), row(kResidual), row(kSlope)};
@@ -52,7 +52,7 @@ public:
     if (k_ == 1) {
       row(kStep).store(constant(1.0f), 0);
     } else if (kProjection == Projection::kl) {
-      project_dirichlet(rows, start, k_, total_, usable_);
+      project_dirichlet(rows, start, k_, total_, writable_);
     }
     if (kProjection == Projection::published) write_valid_blocks(voxel);
     write(voxel);
@@ -132,14 +132,20 @@ private:
   HWY_INLINE void read_as_each_class(size_t voxel) {
     const V one = constant(1.0f), half = constant(0.5f);
     total_ = taking_part_ = pair::Zero();
+    largest_a_ = pair::Zero();
+    others_ = SumOfOthers();
     most_ = constant(-3e38f);
     usable_ = pair::Eq(one, one);
-    too_noisy_ = pair::Lt(one, one);
+    needs_f64_ = pair::Lt(one, one);
     for (size_t c = 0; c < k_; ++c) {
       fetch_next(voxel, c);
       const V a = pair::LoadU(batch_.classes[c].a + voxel);
       row(kA).store(a, c);
       total_ = pair::Add(total_, a);
+      if (kProjection == Projection::kl)
+        largest_a_ = pair::Max(largest_a_, a);
+      else
+        others_.add(a);
       usable_ = pair::And(usable_, is_count(a));
       if (batch_.classes[c].tau == nullptr) continue;
       taking_part_ = pair::Add(taking_part_, a);
@@ -154,7 +160,7 @@ private:
       const V kept = pair::Mul(p.kappa, pair::Mul(s, inv_kappa));
       const V shape = pair::Mul(p.beta, pair::Mul(kappa_s, inv_both));
       const V d = deviation(c, p.tau);
-      if (kNoisy) too_noisy_ = pair::Or(too_noisy_, needs_quadrature(p, d));
+      if (kNoisy) needs_f64_ = pair::Or(needs_f64_, needs_quadrature(p, d));
       const V inv_gamma = pair::Div(one, p.gamma);
       const V excess =
           pair::Min(pair::Mul(pair::Mul(pair::Mul(half, kept), pair::Mul(d, inv_gamma)), d), constant(1e30f));
@@ -170,6 +176,8 @@ private:
       row(kCurve).store(log_curve(of_excess, excess), c);
       row(kInvKappa).store(inv_kappa, c);
     }
+    if (kProjection == Projection::kl && k_ > 1)
+      needs_f64_ = pair::Or(needs_f64_, pair::Lt(pair::Sub(total_, largest_a_), constant(kLeastOthers)));
   }
 
   HWY_INLINE void weigh() {
@@ -218,7 +226,7 @@ private:
 
   /// a^ - a by E[w] (E[w] - E[w^2])/(E[w^2] - E[w]^2), all sums of positive terms.
   HWY_INLINE V published_step(V a, V r, V not_r) const {
-    const V others = pair::Sub(total_, a), x = pair::Add(a, r);
+    const V others = others_.others(a), x = pair::Add(a, r);
     const V own = pair::Mul(a, pair::Add(others, not_r));
     const V numerator = pair::MulAdd(others, r, own);
     const V denominator =
@@ -264,8 +272,8 @@ private:
       return;
     }
     float state[2 * HWY_MAX_BYTES / sizeof(float)];
-    const V noisy = pair::IfThenElseZero(pair::And(usable_, too_noisy_), constant(float(kTooNoisy)));
-    pair::StoreU(pair::IfThenElse(writable_, constant(float(kUpdated)), noisy), state);
+    const V left = pair::IfThenElseZero(pair::And(usable_, needs_f64_), constant(float(kNeedsF64)));
+    pair::StoreU(pair::IfThenElse(writable_, constant(float(kUpdated)), left), state);
     for (size_t lane = 0; lane < lanes_; ++lane) batch_.updated[voxel + lane] = uint8_t(state[lane]);
   }
 
@@ -275,8 +283,10 @@ private:
   float* rows_;
   V noise_variance_;
   V total_, taking_part_, most_;  // sum of a; of classes that take part; largest log weight
+  V largest_a_;                   // `kl`
+  SumOfOthers others_;            // `published`: of a
   Weights weights_;
-  M usable_, too_noisy_, writable_;
+  M usable_, needs_f64_, writable_;
   bool all_writable_ = false;
 };
 

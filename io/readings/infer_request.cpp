@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/error.h"
+#include "inference/dirichlet.h"
 #include "inference/priors.h"
 
 namespace felt {
@@ -212,6 +213,14 @@ void parse_readings(const json& document, InferRequest& request) {
   }
 }
 
+/// Of a Dirichlet that is to be projected.
+void check_concentrations(const json& prior, std::span<const double> a) {
+  const std::string name = prior.contains("a") ? "a" : "alpha";
+  for (size_t c = 0; c < a.size(); ++c)
+    if (!(a[c] >= kLeastConcentration && a[c] <= kMostConcentration))
+      fail(element("prior." + name, prior[name], c), "a number from 1e-15 to 1e15", shown(json(a[c])));
+}
+
 }  // namespace
 
 InferRequest parse_infer_request(std::string_view line) {
@@ -246,6 +255,8 @@ InferRequest parse_infer_request(std::string_view line) {
       fail("projection", "'kl' or 'published'", shown(*projection));
     request.projection = *projection == "published" ? Projection::published : Projection::kl;
   }
+  if (request.model == InferRequest::Model::mixture && request.projection == Projection::kl)
+    check_concentrations(document["prior"], request.a);
   return request;
 }
 
