@@ -20,6 +20,8 @@ std::string hexadecimal(uint64_t value) {
   return text;
 }
 
+std::string size_text(int64_t width, int64_t height) { return std::to_string(width) + " x " + std::to_string(height); }
+
 std::string nearest_word(const std::string& word, const std::vector<std::string>& known) {
   // Levenshtein 1966, one row of the table at a time.
   const auto distance = [](const std::string& a, const std::string& b) {

@@ -14,6 +14,9 @@ std::string number_text(double value, const char* format = "%g");
 /// All 16 hexadecimal digits of a number, in small letters.
 std::string hexadecimal(uint64_t value);
 
+/// "640 x 480".
+std::string size_text(int64_t width, int64_t height);
+
 /// The known word nearest to `word`: fewest insertions, deletions and replacements; the case of letters does not count.
 /// Empty where none is near.
 std::string nearest_word(const std::string& word, const std::vector<std::string>& known);

@@ -241,14 +241,13 @@ void check(const EvaluateCommand& c) {
     throw CLI::RequiredError("--reference-mesh, --reference-labels or --reference-readings");
   need(c.reliability.empty() || !c.reference_labels.empty() || !c.label_name.empty(), "--reliability",
        "--reference-labels, or --reference-mesh with --label-name");
-  const bool of_sequence = !c.reference_labels.empty() || names_sequence(c.trajectory);
+  const bool along_sequence = names_sequence(c.trajectory), of_sequence = along_sequence || !c.reference_labels.empty();
   need(c.frames.empty() || of_sequence, "--frames", "--reference-labels or --trajectory SEQUENCE");
   need(c.format.empty() || of_sequence, "--format", "--reference-labels or --trajectory SEQUENCE");
-  need(!fs::is_regular_file(c.trajectory) || names_sequence(c.trajectory) ||
-           (c.intrinsics->count() > 0 && c.size->count() > 0),
+  need(!fs::is_regular_file(c.trajectory) || along_sequence || (c.intrinsics->count() > 0 && c.size->count() > 0),
        "--trajectory FILE", "--intrinsics and --size");
   need(c.trajectory.empty() || !c.reference_mesh.empty(), "--trajectory", "--reference-mesh");
-  need(c.size->count() == 0 || (!c.trajectory.empty() && !names_sequence(c.trajectory)), "--size", "--trajectory FILE");
+  need(c.size->count() == 0 || (!c.trajectory.empty() && !along_sequence), "--size", "--trajectory FILE");
   need(c.labels.empty() || !c.reference_labels.empty(), "--labels", "--reference-labels");
   need(c.classes.empty() || !c.reference_labels.empty() || !c.label_name.empty(), "--classes",
        "--reference-labels or --label-name");

@@ -97,7 +97,7 @@ void add_friction(CLI::App& app) {
   command.add_option("LOG", options->log, "CSV with columns t, fx, fy, fz (seconds, newtons)")->required();
   CLI::Option* normal =
       command.add_option("--normal", options->normal, "Surface normal in the frame of the forces: x,y,z")
-          ->check(check_point);
+          ->check(check_direction);
   CLI::Option* at =
       command.add_option("--at", options->at, "Contact point, metres: x,y,z (for the touch)")->check(check_point);
   command.add_option("--map", options->map, "Take the normal from this map (forces in the world frame)")

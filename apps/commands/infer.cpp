@@ -15,6 +15,7 @@
 #include "apps/output/output_files.h"
 #include "core/error.h"
 #include "core/simd.h"
+#include "core/text.h"
 #include "io/files/atomic_file.h"
 #include "io/readings/fit_priors.h"
 #include "io/readings/infer_json.h"
@@ -55,6 +56,10 @@ int run_infer(const InferOptions& options) {
   require_ending(options.plot, ".svg");
   require_ending(options.properties_out, ".yaml");
   if (!options.properties_out.empty()) require_no_file(options.properties_out, options.overwrite);
+  if (!options.support.empty() && !(options.support[0] < options.support[1]))
+    throw CLI::ValidationError(
+        describe_mismatch("--support", "range", "two numbers, the smaller one first",
+                          number_text(options.support[0]) + " and " + number_text(options.support[1])));
   if (!options.simd.empty()) of_command_line([&] { choose_simd(options.simd, "--simd"); });
   if (!options.fit_priors.empty()) return run_fit(options);
   std::ios::sync_with_stdio(false);

@@ -44,15 +44,6 @@ struct RenderCommand {
 
 const std::vector<std::string> kImages = {"depth", "normal", "color", "class", "entropy"};
 
-Eigen::Vector3d parse_up(const std::string& text) {
-  Eigen::Vector3d up;
-  int used = 0;
-  if (std::sscanf(text.c_str(), "%lf,%lf,%lf%n", &up.x(), &up.y(), &up.z(), &used) != 3 ||
-      size_t(used) != text.size() || !up.allFinite() || up.isZero())
-    throw ConfigError(describe_mismatch("--up", "direction", "x,y,z", text));
-  return up;
-}
-
 /// A property's mean or sd, asked for as "friction.mean".
 struct PropertyImage {
   int property = 0;
@@ -162,6 +153,7 @@ Viewpoints viewpoints_of(const RenderCommand& command) {
       problems.add_of_usage(describe_mismatch("render", option->get_name(), "--pose or --trajectory", "none"));
   if (command.overview.empty() && command.up_option->count() > 0)
     problems.add_of_usage(describe_mismatch("render", "--up", "--overview, which it is for", "none"));
+  problems.attempt([&] { require_ending(command.overview, ".png"); });
   problems.throw_if_any();
   if (command.trajectory.empty()) {
     views.camera = camera_of(command.camera);
@@ -218,8 +210,7 @@ int render(const RenderCommand& command) {
   json["views"] = nlohmann::ordered_json::array();
   if (!levels.empty()) json["levels"] = levels;
   if (!command.overview.empty()) {
-    require_ending(command.overview, ".png");
-    write_png(command.overview, overview_picture(extract_mesh(map), parse_up(command.up)));
+    write_png(command.overview, overview_picture(extract_mesh(map), point_of(command.up)));
     json["overview"] = command.overview;
   }
   if (!poses.empty()) {
@@ -298,8 +289,9 @@ void add_render(CLI::App& app) {
   sub.add_option("--overview", command.overview, "One picture of the whole map from outside and above (PNG)");
   for (const char* name : {"--out", "--images", "--colored", "--properties", "--intrinsics", "--size", "--max-depth"})
     command.of_views.push_back(sub.get_option(name));
-  command.up_option =
-      sub.add_option("--up", command.up, "Upward direction in the world, for --overview")->capture_default_str();
+  command.up_option = sub.add_option("--up", command.up, "Upward direction in the world, for --overview")
+                          ->check(check_direction)
+                          ->capture_default_str();
 }
 
 }  // namespace felt::apps

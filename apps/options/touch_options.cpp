@@ -10,6 +10,7 @@
 #include "apps/options/number_checks.h"
 #include "apps/options/run_settings.h"
 #include "core/error.h"
+#include "core/pose.h"
 #include "io/readings/mask_image.h"
 #include "io/tables/property_yaml.h"
 
@@ -38,6 +39,12 @@ std::string check_point(const std::string& text) {
   const auto numbers = numbers_of(text);
   if (numbers && numbers->size() == 3) return "";
   return "expected x,y,z in metres, found '" + text + "'";
+}
+
+std::string check_direction(const std::string& text) {
+  const auto numbers = numbers_of(text);
+  if (numbers && numbers->size() == 3 && Eigen::Vector3d(numbers->data()).stableNorm() > 0) return "";
+  return "expected a direction x,y,z, found '" + text + "'";
 }
 
 Eigen::Vector3d point_of(const std::string& text) {
@@ -88,6 +95,11 @@ RegionSettings RegionOptions::resolved(const Map& map) const {
   out.rule = rule_of_name(rule);
   if (out.rule == RegionRule::sphere && !std::isfinite(out.radius_m))
     throw CLI::ValidationError(describe_mismatch("--region sphere", "limit", "--radius", "none"));
+  if (pose.size() == 16) {
+    const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> recorded(pose.data());
+    if (Eigen::Isometry3d T_world_camera; rigid_pose(recorded, T_world_camera) != PoseFault::none)
+      throw CLI::ValidationError(describe_mismatch("--pose", "matrix", "a rigid transform", "another"));
+  }
   validate(out);
   return out;
 }

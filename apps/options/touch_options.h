@@ -12,6 +12,8 @@ namespace felt::apps {
 
 /// Accepts "x,y,z" with three finite numbers; the check of options that take a point.
 std::string check_point(const std::string& text);
+/// The same, not all of them 0.
+std::string check_direction(const std::string& text);
 Eigen::Vector3d point_of(const std::string& text);
 
 /// Options that say which voxels a touch speaks for, shared by `touch`, `region` and `export`.

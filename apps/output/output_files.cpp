@@ -16,6 +16,7 @@
 #include "io/files/atomic_file.h"
 #include "io/map_file/map_file.h"
 #include "mapping/grids/leaf_mask.h"
+#include "mapping/labels/class_belief.h"
 #include "mapping/maps/table_difference.h"
 
 namespace felt::apps {
@@ -48,10 +49,7 @@ size_t evidence_missing_from(const Map& map, const Map& older) {
   for (const Block& block : older.store.blocks()) {
     const Block* kept = map.store.get(block.coord);
     for (const EvidencePlane& plane : block.evidence) {
-      const Plane* counts = nullptr;
-      if (kept != nullptr)
-        for (const EvidencePlane& other : kept->evidence)
-          if (other.slot == plane.slot) counts = other.counts;
+      const Plane* counts = kept != nullptr ? evidence_counts(*kept, plane.slot) : nullptr;
       for (int i = 0; i < kBlockVoxels; ++i)
         missing += plane.counts->value[i] > 0 && !(counts != nullptr && counts->value[i] > 0);
     }

@@ -81,7 +81,7 @@ double share_of_equal_low_bits(const std::vector<DepthImage>& depths, double sca
 
 struct Size {
   int width = 0, height = 0;
-  std::string text() const { return std::to_string(width) + " x " + std::to_string(height); }
+  std::string text() const { return size_text(width, height); }
 };
 
 /// Size of the first depth image whose header can be read; 0 x 0 where there is none, or images are in a container.

@@ -6,6 +6,8 @@
 #include <cstring>
 #include <string_view>
 
+#include "core/text.h"
+
 namespace felt {
 namespace {
 
@@ -114,8 +116,8 @@ private:
     const int64_t width = int64_t(window_.max.x) - window_.min.x + 1,
                   height = int64_t(window_.max.y) - window_.min.y + 1;
     if (width < 1 || height < 1 || width > 0x7fffffff || height > 0x7fffffff || channels->num_channels < 1)
-      throw unreadable("a size and channels", std::to_string(width) + " x " + std::to_string(height) + ", " +
-                                                  std::to_string(channels->num_channels) + " channels");
+      throw unreadable("a size and channels",
+                       size_text(width, height) + ", " + std::to_string(channels->num_channels) + " channels");
     const int bits = channels->entries[0].pixel_type == EXR_PIXEL_HALF ? 16 : 32;
     header_ = {ImageFormat::exr, int(width), int(height), channels->num_channels, bits, true};
   }

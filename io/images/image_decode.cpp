@@ -7,6 +7,7 @@
 #include <cstring>
 #include <memory>
 
+#include "core/text.h"
 #include "io/images/exr_decode.h"
 #include "io/images/npy_decode.h"
 #include "io/images/png_decode.h"
@@ -50,10 +51,9 @@ ImageHeader png_header(std::span<const uint8_t> file, const std::string& where) 
     return false;
   };
   if (width == 0 || height == 0 || width > 0x7fffffff || height > 0x7fffffff || color_type > 6 || !has_depth())
-    throw ImageError("unreadable",
-                     describe_mismatch(where, "PNG header", "a valid size, depth and colour type",
-                                       std::to_string(width) + " x " + std::to_string(height) + ", " +
-                                           std::to_string(bits) + " bits, colour type " + std::to_string(color_type)));
+    throw ImageError("unreadable", describe_mismatch(where, "PNG header", "a valid size, depth and colour type",
+                                                     size_text(width, height) + ", " + std::to_string(bits) +
+                                                         " bits, colour type " + std::to_string(color_type)));
   return {ImageFormat::png, int(width), int(height), kChannels[color_type], bits};
 }
 
@@ -72,8 +72,8 @@ ImageHeader jpeg_header(std::span<const uint8_t> file, const std::string& where)
       if (at + 10 > file.size()) break;
       const int height = file[at + 5] << 8 | file[at + 6], width = file[at + 7] << 8 | file[at + 8];
       if (width == 0 || height == 0)
-        throw ImageError("unreadable", describe_mismatch(where, "JPEG size", "at least 1 x 1",
-                                                         std::to_string(width) + " x " + std::to_string(height)));
+        throw ImageError("unreadable",
+                         describe_mismatch(where, "JPEG size", "at least 1 x 1", size_text(width, height)));
       return {ImageFormat::jpeg, width, height, file[at + 9], file[at + 4]};
     }
     if (marker == 0xd9 || marker == 0xda || length < 2)
@@ -184,7 +184,7 @@ ImageHeader read_image_header(std::span<const uint8_t> file, const std::string& 
   if (int64_t(header.width) * header.height > kMaxImagePixels)
     throw ImageError("too large",
                      describe_mismatch(where, "image size", "at most " + std::to_string(kMaxImagePixels) + " pixels",
-                                       std::to_string(header.width) + " x " + std::to_string(header.height)));
+                                       size_text(header.width, header.height)));
   return header;
 }
 

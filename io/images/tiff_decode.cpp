@@ -8,6 +8,8 @@
 #include <memory>
 #include <vector>
 
+#include "core/text.h"
+
 namespace felt {
 namespace {
 
@@ -77,8 +79,8 @@ public:
     TIFFGetFieldDefaulted(tiff_.get(), TIFFTAG_BITSPERSAMPLE, &bits);
     TIFFGetFieldDefaulted(tiff_.get(), TIFFTAG_SAMPLEFORMAT, &format);
     if (width == 0 || height == 0 || width > 0x7fffffff || height > 0x7fffffff)
-      throw ImageError("unreadable", describe_mismatch(where_, "TIFF size", "1 x 1 to 2^31 - 1",
-                                                       std::to_string(width) + " x " + std::to_string(height)));
+      throw ImageError("unreadable",
+                       describe_mismatch(where_, "TIFF size", "1 x 1 to 2^31 - 1", size_text(width, height)));
     header_ = {ImageFormat::tiff, int(width), int(height), channels, bits, format == SAMPLEFORMAT_IEEEFP};
     integer_ = format == SAMPLEFORMAT_UINT;
   }

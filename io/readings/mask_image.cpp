@@ -34,10 +34,10 @@ Image<uint8_t> set_pixels(const std::filesystem::path& file) {
 ViewMask read_view_mask(const std::filesystem::path& file, const std::vector<double>& intrinsics,
                         const std::vector<double>& pose) {
   const Image<uint8_t> image = set_pixels(file);
-  const auto size_text = [](double w, double h) { return number_text(w) + " x " + number_text(h); };
+  const auto size_of = [](double w, double h) { return number_text(w) + " x " + number_text(h); };
   if (intrinsics.size() == 6 && (intrinsics[4] != image.width() || intrinsics[5] != image.height()))
     throw FormatError(describe_mismatch(file.string(), "size of the mask",
-                                        size_text(intrinsics[4], intrinsics[5]) + " as its camera",
+                                        size_of(intrinsics[4], intrinsics[5]) + " as its camera",
                                         size_text(image.width(), image.height())));
   ViewMask view;
   view.camera = {intrinsics.at(0), intrinsics.at(1), intrinsics.at(2), intrinsics.at(3), image.width(), image.height()};

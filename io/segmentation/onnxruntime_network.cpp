@@ -1,4 +1,5 @@
 #include "core/error.h"
+#include "core/text.h"
 #include "io/segmentation/network.h"
 
 #ifdef FELTMAP_HAVE_ONNXRUNTIME
@@ -53,9 +54,7 @@ public:
       floats ? take(result[0].GetTensorData<float>()) : take(result[0].GetTensorData<int64_t>());
       return planes;
     } catch (const Ort::Exception& fault) {
-      fail("a model that ONNX Runtime can run on an input of " + std::to_string(input.width) + " x " +
-               std::to_string(input.height),
-           fault);
+      fail("a model that ONNX Runtime can run on an input of " + size_text(input.width, input.height), fault);
     }
   }
 

@@ -3,6 +3,7 @@
 #include <opencv2/dnn.hpp>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/segmentation/network.h"
 
 namespace felt {
@@ -52,9 +53,7 @@ public:
       planes.value.assign(output.ptr<float>(), output.ptr<float>() + output.total());
       return planes;
     } catch (const cv::Exception& fault) {
-      fail("a model that OpenCV's dnn module can run on an input of " + std::to_string(input.width) + " x " +
-               std::to_string(input.height),
-           fault);
+      fail("a model that OpenCV's dnn module can run on an input of " + size_text(input.width, input.height), fault);
     }
   }
 

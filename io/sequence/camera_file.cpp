@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/files/text_input.h"
 #include "io/files/yaml_problems.h"
 #include "io/images/image_decode.h"
@@ -113,9 +114,8 @@ void check_camera_fits_image(const PinholeCamera& camera, const std::string& whe
                                 : "the layout's default " +
                                       to_string(Intrinsics{camera.fx, camera.fy, camera.cx, camera.cy}) +
                                       "; give --intrinsics fx,fy,cx,cy or a " + lacking_file;
-  throw FormatError(describe_mismatch(
-      where, "intrinsics",
-      "a camera of " + std::to_string(camera.width) + " x " + std::to_string(camera.height) + " images", found));
+  throw FormatError(describe_mismatch(where, "intrinsics",
+                                      "a camera of " + size_text(camera.width, camera.height) + " images", found));
 }
 
 }  // namespace felt

@@ -2,16 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <tuple>
 #include <utility>
 
 #include "core/error.h"
-#include "io/files/text_input.h"
+#include "core/text.h"
 #include "io/images/depth_decode.h"
 #include "io/images/image_decode.h"
 #include "io/sequence/camera_file.h"
+#include "io/sequence/depth_camera.h"
 #include "io/sequence/frame_selection.h"
+#include "io/sequence/image_source.h"
 #include "io/sequence/lidar_scan.h"
 #include "io/sequence/probability_images.h"
 #include "io/sequence/recorded_pose.h"
@@ -23,51 +23,8 @@ namespace felt {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr size_t kImageFileLimitBytes = size_t(1) << 28;
 /// No sensor sees as far; what floating-point depth holds beyond it means nothing measured.
 constexpr float kFarthestMetres = 10000;
-
-/// Thrown within `read` only: the frame becomes a SkippedFrame.
-struct Skip {
-  std::string reason, detail;
-};
-
-std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
-
-std::string read_source(const ImageSource& source, const std::string& kind) {
-  std::error_code fault;
-  if (source.empty() || !fs::exists(source.path, fault))
-    throw Skip{"missing " + kind + " image", source.empty() ? "no file" : source.path.string()};
-  if (source.bytes == 0) {
-    try {
-      return read_whole_file(source.path, kImageFileLimitBytes);
-    } catch (const Error& problem) {
-      throw Skip{"unreadable " + kind + " image", problem.what()};
-    }
-  }
-  if (source.bytes > kImageFileLimitBytes)
-    throw Skip{"too large " + kind + " image", source.path.string() + ": " + std::to_string(source.bytes) + " bytes"};
-  std::ifstream file(source.path, std::ios::binary);
-  std::string bytes(source.bytes, '\0');
-  if (!file.seekg(std::streamoff(source.offset)) || !file.read(bytes.data(), std::streamsize(bytes.size())))
-    throw Skip{"truncated " + kind + " image", source.path.string() + " at byte " + std::to_string(source.offset)};
-  return bytes;
-}
-
-std::span<const uint8_t> as_bytes(const std::string& text) {
-  return {reinterpret_cast<const uint8_t*>(text.data()), text.size()};
-}
-
-/// Runs a decoder and turns its complaint into a reason to skip the frame.
-template <typename Decode>
-auto decoded(const ImageSource& source, const std::string& kind, Decode decode) {
-  const std::string bytes = read_source(source, kind);
-  try {
-    return decode(as_bytes(bytes), source.path.string());
-  } catch (const ImageError& fault) {
-    throw Skip{fault.reason() + " " + kind + " image", fault.what()};
-  }
-}
 
 class ListedSequence final : public SequenceReader {
 public:
@@ -81,7 +38,6 @@ public:
   ReadResult read(int64_t i) const override;
 
 private:
-  void find_camera(const fs::path& path);
   /// Throws FormatError where the first colour image cannot be the stated camera's.
   void check_color_camera(const fs::path& path) const;
   int probability_ranks() const;
@@ -133,7 +89,7 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   info_.recorded_frames = int64_t(listing_.frames.size());
   info_.fingerprint = fingerprint(listing_);
   info_.content = frames_content(listing_);
-  find_camera(path);
+  info_.camera = find_depth_camera(listing_, path);
 
   select_frames(options.frames, listing_);
   const auto any = [&](auto test) { return std::any_of(listing_.frames.begin(), listing_.frames.end(), test); };
@@ -156,57 +112,13 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   }
 }
 
-void ListedSequence::find_camera(const fs::path& path) {
-  // The size that most of the first depth images have that can be read; the camera's, where one of them has that.
-  constexpr int kAsked = 9;
-  std::string last_fault = "no depth image";
-  std::vector<std::pair<int, int>> sizes;
-  int width = 0, height = 0;
-  const auto votes = [&](std::pair<int, int> size) { return std::count(sizes.begin(), sizes.end(), size); };
-  for (const FrameRecord& frame : listing_.frames) {
-    if (width > 0 || sizes.size() == kAsked) break;
-    if (frame.depth.empty()) {
-      if (!frame.fault_detail.empty()) last_fault = frame.fault_detail;
-      continue;
-    }
-    if (frame.depth.codec != ImageSource::Codec::image_file) {
-      width = listing_.width, height = listing_.height;
-      break;
-    }
-    try {
-      const std::string bytes = read_source(frame.depth, "depth");
-      const ImageHeader header = read_image_header(as_bytes(bytes), frame.depth.path.string());
-      sizes.emplace_back(header.width, header.height);
-    } catch (const Skip& skip) {
-      last_fault = skip.detail;
-    } catch (const ImageError& fault) {
-      last_fault = fault.what();
-    }
-  }
-  if (!sizes.empty()) {
-    std::pair size = *std::max_element(sizes.begin(), sizes.end(),
-                                       [&](const auto& a, const auto& b) { return votes(a) < votes(b); });
-    if (const std::pair stated{listing_.width, listing_.height}; votes(stated) > 0) size = stated;
-    std::tie(width, height) = size;
-  }
-  if (width == 0)
-    throw FormatError(describe_mismatch(path.string(), "depth images", "at least one that can be read", last_fault));
-  if (listing_.width > 0 && (listing_.width != width || listing_.height != height))
-    throw FormatError(describe_mismatch(path.string(), "image size",
-                                        size_text(listing_.width, listing_.height) + " as the camera says",
-                                        size_text(width, height) + " in the first depth images"));
-  const Intrinsics k = listing_.intrinsics.value_or(Intrinsics{});
-  info_.camera = {k.fx, k.fy, k.cx, k.cy, width, height};
-  check_camera_fits_image(info_.camera, path.string(), listing_.lacking_camera_file);
-}
-
 void ListedSequence::check_color_camera(const fs::path& path) const {
   for (const FrameRecord& frame : listing_.frames) {
     if (frame.color.empty() || !frame.fault.empty()) continue;
     ImageHeader header;
     try {
       header = decoded(frame.color, "colour", read_image_header);
-    } catch (const Skip&) {
+    } catch (const SkipFrame&) {
       continue;  // that frame is skipped and counted when it is read
     }
     if (listing_.color_width > 0 && (header.width != listing_.color_width || header.height != listing_.color_height))
@@ -227,7 +139,7 @@ int ListedSequence::probability_ranks() const {
     try {
       const ImageHeader header = decoded(frame.probabilities, "probability", read_image_header);
       return std::max(1, header.height / (2 * info_.camera.height));
-    } catch (const Skip&) {
+    } catch (const SkipFrame&) {
     }
   }
   return 1;
@@ -253,23 +165,23 @@ ReadResult ListedSequence::read(int64_t i) const {
     else if (!record.class_maps.empty())
       frame.probabilities = read_class_maps(record);
     return frame;
-  } catch (const Skip& skip) {
+  } catch (const SkipFrame& skip) {
     return SkippedFrame{record.index, skip.reason, "frame " + std::to_string(record.index) + ": " + skip.detail};
   }
 }
 
 Eigen::Isometry3d ListedSequence::read_pose(const FrameRecord& frame) const {
   const auto recorded = recorded_pose(frame);
-  if (const auto* problem = std::get_if<PoseProblem>(&recorded)) throw Skip{problem->reason, problem->detail};
+  if (const auto* problem = std::get_if<PoseProblem>(&recorded)) throw SkipFrame{problem->reason, problem->detail};
   return camera_pose(std::get<Eigen::Isometry3d>(recorded), listing_.pose_convention, listing_.T_body_camera);
 }
 
 template <typename Stored>
 DepthImage ListedSequence::metres_of(const Image<Stored>& stored, const ImageSource& source) const {
   if (stored.width() != info_.camera.width || stored.height() != info_.camera.height)
-    throw Skip{"wrong-size depth image",
-               describe_mismatch(source.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
-                                 size_text(stored.width(), stored.height()))};
+    throw SkipFrame{"wrong-size depth image",
+                    describe_mismatch(source.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
+                                      size_text(stored.width(), stored.height()))};
   DepthImage depth_m(stored.width(), stored.height());
   const bool rotated = listing_.depth_encoding == DepthEncoding::rotated3;
   const float scale = float(listing_.depth_scale);
@@ -292,7 +204,7 @@ DepthImage ListedSequence::read_depth(const ImageSource& source) const {
       return depth_of_scan(decode_scan(bytes, where), source.face);
     });
     if (std::none_of(depth_m.begin(), depth_m.end(), [](float depth) { return depth > 0; }))
-      throw Skip{kDepthAllZero, source.path.string()};
+      throw SkipFrame{kDepthAllZero, source.path.string()};
     return depth_m;
   }
   const StoredDepth stored = decoded(source, "depth", [&](std::span<const uint8_t> bytes, const std::string& where) {
@@ -302,7 +214,7 @@ DepthImage ListedSequence::read_depth(const ImageSource& source) const {
   });
   DepthImage depth_m = std::visit([&](const auto& image) { return metres_of(image, source); }, stored);
   if (std::none_of(depth_m.begin(), depth_m.end(), [](float depth) { return depth > 0; }))
-    throw Skip{kDepthAllZero, source.path.string()};
+    throw SkipFrame{kDepthAllZero, source.path.string()};
   if (!undistortion_.empty()) depth_m = undistorted(depth_m, undistortion_, 0.0f);
   for (size_t p = 0; p < z_per_ray_length_.size(); ++p) depth_m.data()[p] *= z_per_ray_length_.data()[p];
   return depth_m;
@@ -350,8 +262,8 @@ Image<uint16_t> ListedSequence::read_ids(const ImageSource& source, const std::s
     expected += ", or the colour image's " + size_text(header.width, header.height);
   }
   if (!fits)
-    throw Skip{"wrong-size " + kind + " image",
-               describe_mismatch(source.path.string(), "size", expected, size_text(image.width(), image.height()))};
+    throw SkipFrame{"wrong-size " + kind + " image", describe_mismatch(source.path.string(), "size", expected,
+                                                                       size_text(image.width(), image.height()))};
   return registered_to_depth<uint16_t>(image, camera_of_color_grid(image.width(), image.height()), depth_m,
                                        info_.camera, listing_.T_color_depth, kNoLabel, color_distortion());
 }
@@ -372,7 +284,7 @@ Image<uint16_t> ListedSequence::read_masks(const std::vector<ImageSource>& masks
   };
   std::vector<Mask> all;
   for (const ImageSource& source : masks) {
-    if (all.size() + 1 == kNoLabel) throw Skip{"too many masks", source.path.parent_path().string()};
+    if (all.size() + 1 == kNoLabel) throw SkipFrame{"too many masks", source.path.parent_path().string()};
     Mask mask{read_ids(source, "mask", depth_m, nullptr), 1, uint16_t(all.size() + 1), 0};
     for (uint16_t& value : mask.image)
       if (value == kNoLabel) value = 0;  // outside the labelled image
@@ -420,11 +332,12 @@ ProbabilityImage ListedSequence::read_probabilities(const ImageSource& source, c
   if (stack.width() == width && stack.height() == height && !labels.empty())
     return probabilities_of_confidence(labels, stack, scale);
   if (stack.width() != width || stack.height() % (2 * height) != 0)
-    throw Skip{"wrong-size probability image",
-               describe_mismatch(source.path.string(), "size",
-                                 std::to_string(width) + " x 2 m " + std::to_string(height) + " for the m best, or " +
-                                     size_text(width, height) + " for the confidence of label images",
-                                 size_text(stack.width(), stack.height()))};
+    throw SkipFrame{
+        "wrong-size probability image",
+        describe_mismatch(source.path.string(), "size",
+                          std::to_string(width) + " x 2 m " + std::to_string(height) + " for the m best, or " +
+                              size_text(width, height) + " for the confidence of label images",
+                          size_text(stack.width(), stack.height()))};
   ProbabilityImage image = probabilities_of_stack(stack, height, scale);
   for (uint16_t& id : image.class_id) id = moved(id);
   return image;
@@ -436,9 +349,10 @@ ProbabilityImage ListedSequence::read_class_maps(const FrameRecord& frame) const
     float scale = 1;
     Image<uint16_t> values = read_probability_planes(map.image, scale);
     if (values.width() != info_.camera.width || values.height() != info_.camera.height)
-      throw Skip{"wrong-size probability image",
-                 describe_mismatch(map.image.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
-                                   size_text(values.width(), values.height()))};
+      throw SkipFrame{
+          "wrong-size probability image",
+          describe_mismatch(map.image.path.string(), "size", size_text(info_.camera.width, info_.camera.height),
+                            size_text(values.width(), values.height()))};
     const uint16_t id = map.from_network ? moved(map.class_id) : map.class_id;
     if (id != kNoLabel) maps.push_back({id, std::move(values), map.score / scale});
   }

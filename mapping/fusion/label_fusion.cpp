@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/simd.h"
+#include "core/text.h"
 #include "mapping/fusion/label_evidence.h"
 #include "mapping/fusion/label_kernels.h"
 #include "mapping/labels/class_belief.h"
@@ -310,10 +311,9 @@ void fuse_instances(const BandVoxels& band, const Image<uint16_t>& instances, Bl
 template <typename Pixels>
 void require_depth_size(const Frame& frame, const char* what, const Pixels& image, int width, int height) {
   if (image.empty() || (width == frame.depth_m.width() && height == frame.depth_m.height())) return;
-  const auto size = [](int w, int h) { return std::to_string(w) + " x " + std::to_string(h); };
   throw FormatError(describe_mismatch("frame " + std::to_string(frame.index), std::string(what) + " image",
-                                      size(frame.depth_m.width(), frame.depth_m.height()) + " as its depth",
-                                      size(width, height)));
+                                      size_text(frame.depth_m.width(), frame.depth_m.height()) + " as its depth",
+                                      size_text(width, height)));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "mapping/grids/leaf_mask.h"
+#include "mapping/labels/class_belief.h"
 
 namespace felt {
 namespace {
@@ -109,11 +110,8 @@ LeafGrid color_count_grid(const Map& map, const BlockList& list) {
 std::string evidence_name(const Map& map, int slot) { return "evidence/" + map.classes.at_slot(slot).name; }
 
 LeafGrid evidence_grid(const Map& map, int slot, const BlockList& list) {
-  return plane_grid<float>(map, evidence_name(map, slot), list, [slot](const Block& block) {
-    const auto plane = std::find_if(block.evidence.begin(), block.evidence.end(),
-                                    [slot](const EvidencePlane& p) { return p.slot == slot; });
-    return plane->counts->value;
-  });
+  return plane_grid<float>(map, evidence_name(map, slot), list,
+                           [slot](const Block& block) { return evidence_counts(block, slot)->value; });
 }
 
 LeafGrid even_evidence_grid(const Map& map, const BlockList& list) {

@@ -19,6 +19,12 @@ ClassBelief belief_of(std::span<const double> alpha, bool with_entropy) {
 
 }  // namespace
 
+const Plane* evidence_counts(const Block& block, int slot) {
+  const auto plane = std::find_if(block.evidence.begin(), block.evidence.end(),
+                                  [slot](const EvidencePlane& p) { return p.slot == slot; });
+  return plane == block.evidence.end() ? nullptr : plane->counts;
+}
+
 void class_concentration(const Block* block, int offset, const ClassTable& classes, std::span<double> alpha) {
   for (int slot = 0; slot < classes.size(); ++slot) alpha[size_t(slot)] = classes.prior(slot);
   if (block == nullptr) return;

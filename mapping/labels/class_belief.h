@@ -16,6 +16,9 @@ struct ClassBelief {
   float entropy = 0;                    ///< of the class probabilities, nats
 };
 
+/// What vision counted of one class in a block, above its prior; null where it was not seen there.
+const Plane* evidence_counts(const Block& block, int slot);
+
 /// alpha_i = prior_i + count_i + even / k of one voxel by slot (INFERENCE section 1), into k numbers. A null block
 /// holds the prior.
 void class_concentration(const Block* block, int offset, const ClassTable& classes, std::span<double> alpha);

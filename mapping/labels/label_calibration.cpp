@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/error.h"
+#include "core/text.h"
 
 namespace felt {
 
@@ -30,10 +31,9 @@ void count_confusion(const Frame& predicted, const LabelImage& truth, const Clas
   const int width = p.empty() ? predicted.labels.width() : p.width,
             height = p.empty() ? predicted.labels.height() : p.height;
   if (truth.width() != width || truth.height() != height)
-    throw FormatError(
-        describe_mismatch("frame " + std::to_string(predicted.index), "true labels",
-                          std::to_string(width) + " x " + std::to_string(height) + " as the predicted ones",
-                          std::to_string(truth.width()) + " x " + std::to_string(truth.height())));
+    throw FormatError(describe_mismatch("frame " + std::to_string(predicted.index), "true labels",
+                                        size_text(width, height) + " as the predicted ones",
+                                        size_text(truth.width(), truth.height())));
   for (size_t pixel = 0; pixel < truth.size(); ++pixel) {
     const uint16_t row = classes.slot_of_id(truth.data()[pixel]);
     if (row == ClassTable::kNoSlot) {

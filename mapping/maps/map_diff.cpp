@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "mapping/labels/class_belief.h"
 #include "mapping/maps/table_difference.h"
 #include "mapping/touch/touch_view.h"
 
@@ -39,10 +40,7 @@ struct Accumulator {
 };
 
 const Plane* evidence_of(const Block* block, std::optional<int> slot) {
-  if (block == nullptr || !slot) return nullptr;
-  for (const EvidencePlane& plane : block->evidence)
-    if (plane.slot == *slot) return plane.counts;
-  return nullptr;
+  return block != nullptr && slot ? evidence_counts(*block, *slot) : nullptr;
 }
 
 const Block* observed_block(const Map& map, const BlockCoord& coord) {

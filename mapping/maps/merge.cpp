@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "core/text.h"
 #include "mapping/fusion/tsdf_kernels.h"
+#include "mapping/labels/class_belief.h"
 #include "mapping/maps/table_difference.h"
 #include "mapping/touch/touch_update.h"
 
@@ -113,9 +114,8 @@ void merge_evidence(std::span<const Block* const> from, BlockStore& store, Block
   for (const uint16_t slot : slots) {
     double sum[kBlockVoxels] = {};
     for (const Block* block : from)
-      for (const EvidencePlane& plane : block->evidence)
-        if (plane.slot == slot)
-          for (int i = 0; i < kBlockVoxels; ++i) sum[i] += plane.counts->value[i];
+      if (const Plane* counts = evidence_counts(*block, slot))
+        for (int i = 0; i < kBlockVoxels; ++i) sum[i] += counts->value[i];
     Plane* plane = store.new_plane();
     for (int i = 0; i < kBlockVoxels; ++i) plane->value[i] = float(sum[i]);
     to.evidence.push_back({slot, plane});

@@ -219,7 +219,6 @@ Region find_region(const Map& map, const Contact& contact, const RegionSettings&
 
 Region find_region(const Map& map, const ViewMask& view, const RegionSettings& settings, const Contact* contact) {
   validate(settings);
-  const auto size_text = [](int w, int h) { return std::to_string(w) + " x " + std::to_string(h); };
   if (view.mask.width() != view.camera.width || view.mask.height() != view.camera.height)
     throw TouchError(describe_mismatch("region mask", "size", size_text(view.camera.width, view.camera.height),
                                        size_text(view.mask.width(), view.mask.height())));

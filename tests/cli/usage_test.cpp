@@ -112,6 +112,12 @@ TEST_CASE("options that a map or a recording has no use for are named") {
   refused("info " + scene + " --grids", "--grids: what to describe: expected a map");
   refused("touch " + map + " --file x.csv --mask y.png", "--mask");
   refused("touch " + map + " --sequence x --frame 1 --pixel 1,1 --property p --value 1 --pose 1", "--pose");
+  refused("region " + map +
+              " --at 0,0,0 --region mask --mask x.png --intrinsics 1,1,1,1 --pose 2,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1",
+          "--pose: matrix: expected a rigid transform");
+  refused("friction x.csv --normal 0,0,0", "--normal: expected a direction x,y,z, found '0,0,0'");
+  refused("render " + map + " --overview x.png --up 0,0,nan", "--up: expected a direction");
+  refused("infer --fit-priors x.csv --properties-out x.yaml --support nan 1", "--support: range");
 }
 
 TEST_CASE("numbers that cannot be used are repeated as they were given, each once") {

@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "io/sequence/camera_file.h"
 #include "io/sequence/layouts.h"
 #include "io/sequence/layouts/file_names.h"
@@ -126,7 +127,7 @@ SequenceListing list(const fs::path& file_or_folder, const SequenceOptions& opti
                                         std::to_string(color_codec) + " and " + std::to_string(depth_codec)));
   if (depth_width == 0 || depth_height == 0 || depth_width > 8192 || depth_height > 8192 || !(depth_shift > 0))
     throw FormatError(describe_mismatch(path.string(), "depth images", "a size up to 8192 x 8192 and a scale above 0",
-                                        std::to_string(depth_width) + " x " + std::to_string(depth_height)));
+                                        size_text(depth_width, depth_height)));
   listing.width = int(depth_width), listing.height = int(depth_height);
   listing.depth_scale = double(depth_shift);
   if (!options.intrinsics) listing.intrinsics = intrinsics_of(depth_camera, path.string());
