@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <boost/math/quadrature/sinh_sinh.hpp>
+#include <boost/math/tools/minima.hpp>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -87,6 +88,15 @@ std::vector<double> modes(const StudentTMixture& m, double least_height, double 
   std::transform(x.begin(), x.end(), height.begin(), [&](double at) { return pdf(m, at); });
   const double tallest = *std::max_element(height.begin(), height.end());
 
+  const auto refined = [&](const std::vector<double>& at, size_t i) {
+    constexpr int kBits = 30;
+    const double left = at[i > 0 ? i - 1 : i], right = at[i + 1 < at.size() ? i + 1 : i];
+    if (!(left < right)) return at[i];
+    const double top =
+        boost::math::tools::brent_find_minima([&](double y) { return -pdf(m, y); }, left, right, kBits).first;
+    return pdf(m, top) > height[i] ? top : at[i];
+  };
+
   // Walk up and down: a peak counts once the density has since fallen below its ridge and had risen as far before.
   std::vector<double> result;
   size_t peak = 0;
@@ -97,7 +107,7 @@ std::vector<double> modes(const StudentTMixture& m, double least_height, double 
     if (rising) {
       if (i < x.size() && h > height[peak]) peak = i;
       if (h < deepest_ridge * height[peak] && valley < deepest_ridge * height[peak]) {
-        if (height[peak] >= least_height * tallest) result.push_back(x[peak]);
+        if (height[peak] >= least_height * tallest) result.push_back(refined(x, peak));
         rising = false;
         valley = h;
       }

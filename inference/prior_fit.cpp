@@ -24,7 +24,7 @@ double kolmogorov_distance(std::vector<double> values, double mean, double sd) {
 
 }  // namespace
 
-std::optional<PriorFit> fit_prior(const GroupedReadings& groups, double max_nu_0) {
+std::optional<PriorFit> fit_prior(const GroupedReadings& groups, double max_nu_0, std::optional<double> rho_elsewhere) {
   PriorFit fit;
   std::vector<double> all;
   double within_squares = 0, sum_of_squared_sizes = 0;
@@ -56,6 +56,10 @@ std::optional<PriorFit> fit_prior(const GroupedReadings& groups, double max_nu_0
     fit.rho = std::min(between / variance, 0.999);
     // Variance of the grand mean is (sigma^2/n) (1 + (sum n_j^2/n - 1) rho).
     fit.effective_readings = n / (1 + (sum_of_squared_sizes / n - 1) * *fit.rho);
+  } else if (fit.groups == 1 && rho_elsewhere) {
+    fit.assumed_rho = rho_elsewhere;
+    variance /= 1 - *rho_elsewhere;
+    fit.effective_readings = n / (1 + (n - 1) * *rho_elsewhere);
   }
   fit.sd = std::sqrt(variance);
   fit.nu_0 = std::min(fit.effective_readings, max_nu_0);

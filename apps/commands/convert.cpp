@@ -27,6 +27,8 @@ void warn_of_losses(const ConvertResult& result, const ConvertOptions& options) 
   for (const std::string& what : result.left_out)
     spdlog::warn("{} left out: the layout {} has no place for that{}", what, options.layout,
                  options.renumber ? ", or other frame numbers" : "");
+  if (result.touches_elsewhere > 0)
+    spdlog::warn("{} touches left out: those of frames that are not written", result.touches_elsewhere);
   for (const auto& [reason, count] : result.skipped) spdlog::warn("{} frames left out: {}", count, reason);
   if (result.depth_out_of_range > 0)
     spdlog::warn("{} of {} measured pixels are too far for 16 bits, or too near for one, at this depth scale",
@@ -38,11 +40,13 @@ int run(const Arguments& a) {
   for (const std::string& note : reader->info().notes) spdlog::warn("{}", note);
   ProgressBar progress("frames", reader->size(), !a.common.quiet);
   const InterruptGuard interrupt;
+  bool stopped = false;
   const ConvertResult result = convert_sequence(*reader, a.out, a.options, [&](int64_t done) {
     progress.update(done);
-    return !interrupt.requested();
+    stopped = interrupt.requested();
+    return !stopped;
   });
-  if (interrupt.requested()) {
+  if (stopped) {
     std::fprintf(stderr, "feltmap: interrupted: nothing is left at %s\n", a.out.c_str());
     return kInterrupted;
   }
@@ -54,6 +58,7 @@ int run(const Arguments& a) {
                                          {"skipped", result.skipped},
                                          {"depth_measured", result.depth_measured},
                                          {"depth_out_of_range", result.depth_out_of_range},
+                                         {"touches_of_other_frames", result.touches_elsewhere},
                                          {"left_out", result.left_out}};
     print_json(json);
   } else if (!a.common.quiet) {

@@ -359,6 +359,7 @@ int evaluate(EvaluateCommand& command) {
   found.print = !command.common.json && !command.common.quiet;
   if (!command.reference_mesh.empty()) {
     const TriangleMesh reference = read_mesh(command.reference_mesh);
+    warn_if_coarse(reference, command.reference_mesh);
     compare_geometry(command, evaluated, reference, found);
     if (!command.label_name.empty()) compare_mesh_labels(command, evaluated, reference, found);
   }

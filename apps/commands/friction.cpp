@@ -37,7 +37,7 @@ int run_friction(const FrictionOptions& options) {
   std::string normal_from = "assumed: the z axis";
   double normal_sd_rad = 0;
   if (!options.normal.empty()) {
-    settings.normal = point_of(options.normal);
+    settings.normal = point_of(options.normal).stableNormalized();
     normal_from = "given";
   }
   if (!options.map.empty()) {

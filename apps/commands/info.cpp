@@ -208,6 +208,7 @@ std::string frames_text(const Json& runs) {
   return listed(runs, [](const Json& run) {
     const auto first = run[0].get<int64_t>(), step = run[1].get<int64_t>(), count = run[2].get<int64_t>();
     if (count == 1) return std::to_string(first);
+    if (step == 0) return std::to_string(first) + " " + std::to_string(count) + " times";
     const std::string range = std::to_string(first) + " to " + std::to_string(first + step * (count - 1));
     return step == 1 ? range : range + " in steps of " + std::to_string(step);
   });

@@ -50,6 +50,20 @@ float cap(const std::optional<float>& given, const std::vector<Map>& maps, const
   return caps.empty() ? usual : float(*caps.begin());
 }
 
+/// A touch counts where it does in one of the maps, whatever another one took back.
+void warn_of_redone_touches(const std::vector<Map>& maps, const Map& result) {
+  std::vector<std::string> ids;
+  for (const Touch& touch : result.touches.touches)
+    if (!touch.undone && std::any_of(maps.begin(), maps.end(), [&](const Map& map) {
+          const Touch* there = map.touches.find(touch.id);
+          return there != nullptr && there->undone;
+        }))
+      ids.push_back(id_text(touch.id));
+  if (!ids.empty())
+    spdlog::warn("undone in one of the maps and not in another, so that they count: touches {} (feltmap touch --undo)",
+                 listed(ids, {}, 5));
+}
+
 /// Where the result is not what one run over all frames would give.
 void warn_of_what_does_not_add(const std::vector<Map>& maps, const MergeOptions& merging) {
   if (maps.size() < 2) return;
@@ -97,6 +111,7 @@ int run(const Options& options) {
                              "--label-cap", merging.max_evidence);
   warn_of_what_does_not_add(maps, merging);
   Map result = merge(pointers, merging);
+  warn_of_redone_touches(maps, result);
   forget_progress(result);
   if (!writing) writing.emplace(options.out, options.overwrite);
   require_nothing_lost(options.out, result, LostTouches::refuse, options.overwrite);
@@ -137,7 +152,7 @@ void add_merge(CLI::App& app) {
   command
       .add_option("--max-weight", options->max_weight,
                   "Cap of the summed weight [what the maps were made with, else 255]")
-      ->check(above_zero());
+      ->check(at_least_one());
   command
       .add_option("--label-cap", options->max_evidence,
                   "Cap of a voxel's class evidence, 0: none [what the maps were made with, else none]")

@@ -40,6 +40,30 @@ json instance_json(const Block& block, int offset) {
   return {{"id", block.instance->id[offset]}, {"votes", block.instance->votes[offset]}};
 }
 
+/// Trilinear between the voxel centres about a point, of which those that do not count there need not be observed;
+/// nothing where another one was not.
+std::optional<double> interpolated_distance(const Map& map, const Eigen::Vector3d& point) {
+  constexpr double kCounts = 1e-4;  // share of a corner; a point on a mesh is off its edge by the rounding of floats
+  const Eigen::Vector3d at = point / map.voxel_size_m, base = at.array().floor();
+  double sum = 0, total = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    double share = 1;
+    Eigen::Vector3i offset;
+    for (int axis = 0; axis < 3; ++axis) {
+      offset[axis] = corner >> axis & 1;
+      share *= offset[axis] == 1 ? at[axis] - base[axis] : 1 - (at[axis] - base[axis]);
+    }
+    if (share < kCounts) continue;
+    const Eigen::Vector3i voxel = base.cast<int>() + offset;
+    const Index3 index{voxel.x(), voxel.y(), voxel.z()};
+    const Block* block = map.store.get(block_of_voxel(index));
+    if (block == nullptr || !(block->geometry->weight[offset_in_block(index)] > 0)) return std::nullopt;
+    sum += share * double(block->geometry->tsdf[offset_in_block(index)]);
+    total += share;
+  }
+  return sum / total;
+}
+
 /// What is known of a point without beliefs; `voxel`: the observed voxel whose belief is to be added, if there is one.
 json geometry_json(const Map& map, const Eigen::Vector3d& point, bool instances, std::optional<Index3>& voxel) {
   json out;
@@ -59,8 +83,9 @@ json geometry_json(const Map& map, const Eigen::Vector3d& point, bool instances,
     out["reason"] = "never observed";
     return out;
   }
-  const double trilinear = double(sample_tsdf(map, point.x(), point.y(), point.z()));
-  out["signed_distance_m"] = std::isnan(trilinear) ? double(block->geometry->tsdf[offset_in_block(at)]) : trilinear;
+  const std::optional<double> between = interpolated_distance(map, point);
+  out["signed_distance_m"] = between.value_or(double(block->geometry->tsdf[offset_in_block(at)]));
+  out["interpolated"] = between.has_value();
   if (instances) out["instance"] = instance_json(*block, offset_in_block(at));
   voxel = at;
   return out;
@@ -127,7 +152,8 @@ int run_query(const QueryOptions& options) {
       std::printf("%s\n", a["reason"].get<std::string>().c_str());
       continue;
     }
-    std::printf("distance %.4f m, weight %g", a["signed_distance_m"].get<double>(), a["weight"].get<double>());
+    std::printf("distance %.4f m%s, weight %g", a["signed_distance_m"].get<double>(),
+                a["interpolated"].get<bool>() ? "" : " of the nearest voxel", a["weight"].get<double>());
     if (a.contains("class") && !(a["class_evidence"].get<double>() > 0))
       std::printf(", class unknown: no label was seen there");
     else if (a.contains("class"))

@@ -303,13 +303,16 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
     }
   const bool was_complete = complete;
   const auto save = [&] {
-    return save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, touches_done,
-                           sequence->info().content, config, options.out / kMapName);
+    return save_checkpoint(map, report.fusion, scratch.viewpoints.seen(), complete, touches_done, sequence->info(),
+                           config, options.out / kMapName);
   };
   int64_t saved_after = report.resumed_after;  // frames of this run that map.vdb holds
   const auto save_on_the_way = [&] {
     save();
     saved_after = report.fusion.read;
+    // A mesh and a report of another map do not lie beside it.
+    std::error_code ignored;
+    for (const char* name : {kMeshName, kReportName}) fs::remove(options.out / name, ignored);
   };
   fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save_on_the_way, map,
        scratch, report.fusion);

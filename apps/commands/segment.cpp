@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <map>
 #include <memory>
@@ -56,38 +57,67 @@ struct OutputNames {
 };
 
 /// What the images in the folder depend on: they may be added to only where it is the same.
-json state_of(const SegmentOptions& options, const ClassTable& classes) {
+json state_of(const SegmentOptions& options, const SequenceInfo& sequence) {
   json state;
   std::error_code ignored;
   state["sequence"] = fs::weakly_canonical(options.sequence, ignored).string();
+  state["recording"] = sequence.fingerprint;
   state["settings"] = to_json(options.perception);
-  state["labels"] = options.labels.string() + options.probs.string();
-  if (!options.perception.network.empty()) state["net"] = read_whole_file(options.perception.network);
-  state["classes"] = class_table_yaml(classes);
+  const bool with_network = !options.perception.network.empty();
+  if (with_network) state["net"] = read_whole_file(options.perception.network);
+  if (!with_network || !options.perception.masks.empty()) state["labels"] = sequence.reading.at("label images");
+  state["classes"] = class_table_yaml(sequence.classes);
   return state;
+}
+
+/// What --force may not delete: the images that are read, and whatever else no run of segment wrote.
+void require_own_images(const SegmentOptions& options) {
+  std::error_code ignored;
+  if (fs::equivalent(options.sequence, options.out, ignored))
+    throw ConfigError(describe_mismatch(options.out.string(), "output", "a folder of its own", "the recording"));
+  for (const char* folder : {"labels", "probs"}) {
+    const fs::path images = options.out / folder;
+    for (const fs::path& read : {options.labels, options.probs, fs::path(options.perception.masks)})
+      if (!read.empty() && fs::equivalent(read, images, ignored))
+        throw ConfigError(describe_mismatch(images.string(), "output", "a folder of its own", "images that are read"));
+    if (!fs::exists(options.out / kStateName) && fs::exists(images) && !fs::is_empty(images))
+      throw IoError(describe_mismatch(images.string(), "output exists", "images of an earlier run of segment",
+                                      "others, which would be deleted"));
+  }
+}
+
+/// Whether nothing lies in the folder, or what a run left that was stopped before its first image.
+bool as_good_as_empty(const fs::path& folder) {
+  return std::all_of(fs::directory_iterator(folder), fs::directory_iterator(), [](const fs::directory_entry& entry) {
+    const std::string name = entry.path().filename().string();
+    return (name == "labels" || name == "probs") && entry.is_directory() && fs::is_empty(entry.path());
+  });
 }
 
 /// Makes the output folder ready: a new one gets its state and class table, one of an earlier run with the same
 /// settings is gone on with, and any other is refused unless `overwrite`.
-void prepare(const SegmentOptions& options, const OutputNames& names, const ClassTable& classes) {
+void prepare(const SegmentOptions& options, const OutputNames& names, const SequenceInfo& sequence) {
   prepare_output_folder(options.out);
   const fs::path file = options.out / kStateName;
-  const std::string state = json_text(state_of(options, classes), 2) + "\n";
-  if (fs::exists(file) && !options.overwrite) {
-    if (read_whole_file(file) == state) return;
+  remove_abandoned_parts(file);
+  const std::string state = json_text(state_of(options, sequence), 2) + "\n";
+  const bool goes_on = fs::exists(file) && read_whole_file(file) == state;
+  if (fs::exists(file) && !goes_on && !options.overwrite)
     throw ConfigError(describe_mismatch(options.out.string(), "output exists",
                                         "images of the same sequence, network and settings to go on with, or --force",
                                         "others (" + std::string(kStateName) + " says which)"));
-  }
-  if (!fs::exists(file) && !options.overwrite && !fs::is_empty(options.out))
+  if (!fs::exists(file) && !options.overwrite && !as_good_as_empty(options.out))
     throw IoError(describe_mismatch(options.out.string(), "output exists", "an empty folder, or --force",
                                     "a folder that no earlier run of segment made"));
+  require_own_images(options);
   for (const char* folder : {"labels", "probs"}) {
-    fs::remove_all(options.out / folder);
+    if (!goes_on || options.overwrite) fs::remove_all(options.out / folder);
     if (names.probabilities == (std::string(folder) == "probs")) fs::create_directory(options.out / folder);
   }
-  write_file_atomically(options.out / kClassesName, class_table_yaml(classes));
-  write_file_atomically(file, state);
+  // The state comes first: a folder that has it is one of segment, wherever this stops.
+  if (!goes_on) write_file_atomically(file, state);
+  if (!fs::exists(options.out / kClassesName) || !goes_on)
+    write_file_atomically(options.out / kClassesName, class_table_yaml(sequence.classes));
 }
 
 SegmentRecord segment_frames(const SequenceReader& sequence, const Perception& perception, const OutputNames& names,
@@ -145,7 +175,7 @@ int run_segment(SegmentOptions& options) {
   const OutputNames names{options.out, probabilities};
   perception.skip = [names](int64_t frame) { return fs::exists(names.of(frame)); };
   sequence = perceived_sequence(std::move(sequence), perception);
-  prepare(options, names, sequence->info().classes);
+  prepare(options, names, sequence->info());
   SegmentRecord record = segment_frames(*sequence, perception, names, options);
   record.total_s = watch.seconds();
 

@@ -47,12 +47,17 @@ struct OpenedSequence {
   TouchedSequence touched;
 };
 
-std::optional<OpenedSequence> open_touched(const TouchOptions& options) {
+std::optional<OpenedSequence> open_touched(const TouchOptions& options, const Map& map) {
   if (options.sequence.empty()) return std::nullopt;
   SequenceOptions reading;
   reading.instances_dir = options.masks;
   OpenedSequence opened{open_sequence(options.sequence, reading), {}};
   opened.touched = touched_sequence(*opened.reader);
+  if (!map.frames.runs.empty() &&
+      std::none_of(map.frames.runs.begin(), map.frames.runs.end(),
+                   [&](const FusedFrames& run) { return run.sequence == opened.reader->info().fingerprint; }))
+    spdlog::warn("{}: {} was made of other recordings: are its poses in the map's world frame?", options.sequence,
+                 options.map);
   opened.touched.segments = options.masks.empty() ? SegmentSource::geometric : SegmentSource::instances;
   return opened;
 }
@@ -98,6 +103,7 @@ json effect_json(const Map& map, const TouchEffect& effect, const RegionSettings
   out["region"] = summary_json(map, summarize(map, touch.region, settings));
   out["before"] = belief_json(map, effect.before, std::nullopt);
   out["after"] = belief_json(map, effect.after, std::nullopt);
+  out["touches_of_a_part"] = touches_of_a_part(map, touch.region);
   out["without_prior"] = classes_without_prior(map, effect);
   out["relabelled_voxels"] = effect.relabelled;
   out["refused_voxels"] = effect.refused;
@@ -122,6 +128,11 @@ void print_effect(const Map& map, const TouchEffect& effect, const RegionSetting
     std::printf("  %llu voxels kept their state: no valid projection\n",
                 static_cast<unsigned long long>(effect.refused));
   for (const std::string& warning : region.warnings) std::printf("  warning: %s\n", warning.c_str());
+  if (const size_t of_a_part = touches_of_a_part(map, touch.region); of_a_part > 0)
+    std::printf(
+        "  %zu other touches reach into this region and cover no more than half of it: these figures of the region as "
+        "a whole leave them out (feltmap query asks for a point)\n",
+        of_a_part);
   if (const std::string silent = listed(classes_without_prior(map, effect)); !silent.empty())
     std::printf("  warning: no prior of %s for %s: the other classes share what was believed of them\n",
                 touch.request.property.c_str(), silent.c_str());
@@ -233,7 +244,7 @@ int run_touch(const TouchOptions& options) {
             : undo          ? ": undone"
                             : ": redone");
   } else if (!options.file.empty() || options.frame) {
-    const std::optional<OpenedSequence> opened = open_touched(options);
+    const std::optional<OpenedSequence> opened = open_touched(options, map);
     const std::vector<RecordedTouch> touches = recorded_touches(options);
     for (const TouchOutcome& outcome :
          apply_recorded_touches(map, touches, request, opened ? &opened->touched : nullptr)) {

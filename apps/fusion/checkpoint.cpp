@@ -41,10 +41,11 @@ std::vector<Eigen::Isometry3d> poses_of(const json& rows) {
 }
 
 json progress_of(const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints, bool complete,
-                 const std::string& touches, const std::string& recording) {
+                 const std::string& touches, const SequenceInfo& sequence) {
   json unknown = json::array();
   for (const auto& [id, pixels] : record.unknown_ids) unknown.push_back({id, pixels});
-  return {{"recording", recording},
+  return {{"recording", sequence.content},
+          {"reading", sequence.reading},
           {"complete", complete},
           {"read", record.read},
           {"fused", record.fused},
@@ -101,21 +102,28 @@ void require_same_recording(const json& progress, const Map& map, const Sequence
                      : "another"));
 }
 
-/// A file or folder may be named in another way, and what matters is its content: where that is compared, or kept
-/// beside the name, the name does not count; elsewhere it counts as a path.
+/// What the recording itself says may be mended between two runs: a scale, a camera, labels.
+void require_same_reading(const json& progress, const SequenceInfo& now, const std::string& where) {
+  Problems problems;
+  const json then = progress.value("reading", json::object());
+  for (const auto& [name, is] : now.reading) {
+    if (!then.contains(name) || then[name] == is) continue;
+    const std::string was = json_text(then[name]);
+    const bool images = name == "label images";
+    problems.add(describe_mismatch("--resume", "the recording's " + name,
+                                   images ? "those that " + where + " was made of" : was + " as in " + where,
+                                   images ? "others" : json_text(json(is))));
+  }
+  problems.throw_if_any();
+}
+
+/// A file or folder may be named in another way, and what matters is its content, which is compared elsewhere or kept
+/// beside the name. Of touches it matters here that there are any: those of an unfinished run come with its last frame.
 json comparable(json config) {
-  for (const char* key : {"sequence", "classes", "properties", "confusion"}) config.erase(key);
-  if (config.contains("perception")) config["perception"].erase("segmenter");
-  const auto as_path = [](json& in, const char* key) {
-    if (!in.contains(key) || !in[key].is_string()) return;
-    const std::filesystem::path path = in[key].get<std::string>();
-    std::error_code unknown;
-    const std::filesystem::path canonical =
-        std::filesystem::weakly_canonical(path.has_filename() ? path : path.parent_path(), unknown);
-    if (!unknown) in[key] = canonical.string();
-  };
-  for (const char* key : {"labels", "probs", "touches"}) as_path(config, key);
-  if (config.contains("perception")) as_path(config["perception"], "masks");
+  for (const char* key : {"sequence", "labels", "probs", "classes", "properties", "confusion"}) config.erase(key);
+  if (config.contains("perception"))
+    for (const char* key : {"segmenter", "masks"}) config["perception"].erase(key);
+  if (config.contains("touches")) config["touches"] = "given";
   return config;
 }
 
@@ -143,10 +151,10 @@ std::string fusion_settings(const nlohmann::ordered_json& config) {
 }
 
 std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
-                            bool complete, const std::string& touches, const std::string& recording,
+                            bool complete, const std::string& touches, const SequenceInfo& sequence,
                             const nlohmann::ordered_json& config, const std::filesystem::path& path) {
   map.metadata[kConfig] = json_text(config);
-  map.metadata[kProgress] = json_text(progress_of(record, viewpoints, complete, touches, recording));
+  map.metadata[kProgress] = json_text(progress_of(record, viewpoints, complete, touches, sequence));
   // On the way nobody looks at views, and they take longer than the rest.
   return save_map(map, path, {.views = complete || !record.stopped.empty()});
 }
@@ -161,6 +169,7 @@ std::optional<Checkpoint> resume(const std::filesystem::path& path, const Sequen
   const json progress = text_of(map, kProgress, where);
   require_same_recording(progress, map, sequence, where);
   require_same_run(text_of(map, kConfig, where), json::parse(json_text(config)), where);
+  require_same_reading(progress, sequence, where);
   Checkpoint checkpoint{std::move(map), {}, {}, false, {}};
   read_progress(progress, where, checkpoint);
   return checkpoint;

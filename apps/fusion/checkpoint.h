@@ -21,12 +21,11 @@ namespace felt::apps {
 /// the selection of frames are left out, so that parts of one recording have the same.
 std::string fusion_settings(const nlohmann::ordered_json& config);
 
-/// Writes the map with all that `resume` needs, and its views where the run ends. `recording`:
-/// SequenceInfo::content. `config`: settings as used. `viewpoints`: ViewNovelty::seen. `complete`: nothing is left
-/// to do for this map but to mesh it; its recorded touches are in it, and `touches` (JSON) says what became of each.
-/// Returns the map's hash.
+/// Writes the map with all that `resume` needs, and its views where the run ends. `config`: settings as used.
+/// `viewpoints`: ViewNovelty::seen. `complete`: nothing is left to do for this map but to mesh it; its recorded touches
+/// are in it, and `touches` (JSON) says what became of each. Returns the map's hash.
 std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints,
-                            bool complete, const std::string& touches, const std::string& recording,
+                            bool complete, const std::string& touches, const SequenceInfo& sequence,
                             const nlohmann::ordered_json& config, const std::filesystem::path& path);
 
 /// Of a part of a map: no run can go on with it.
@@ -42,8 +41,8 @@ struct Checkpoint {
 };
 
 /// What `save_checkpoint` wrote; nothing where there is no such file. Throws ConfigError where the recording is
-/// another or has changed since, or naming every setting that is another now, and FormatError where the file is no map
-/// of one reconstruction.
+/// another or has changed since, or naming every setting that is another now, be it the recording's own, and
+/// FormatError where the file is no map of one reconstruction.
 std::optional<Checkpoint> resume(const std::filesystem::path& path, const SequenceInfo& sequence,
                                  const nlohmann::ordered_json& config);
 

@@ -30,6 +30,10 @@ CLI::Validator at_least_zero() {
   return number_check("a finite number from 0", "FROM 0", [](double value) { return value >= 0; });
 }
 
+CLI::Validator at_least_one() {
+  return number_check("a finite number from 1", "FROM 1", [](double value) { return value >= 1; });
+}
+
 CLI::Validator finite() {
   return number_check("a finite number", "", [](double) { return true; });
 }

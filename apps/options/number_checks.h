@@ -7,6 +7,7 @@ namespace felt::apps {
 /// Checks of an option's number. CLI11's own let NaN pass and print the largest double in full.
 CLI::Validator above_zero();
 CLI::Validator at_least_zero();
+CLI::Validator at_least_one();
 CLI::Validator finite();
 CLI::Validator within(double low, double high);  ///< both ends allowed
 CLI::Validator above_zero_up_to(double high);    ///< not 0, `high` allowed

@@ -1,5 +1,6 @@
 #include "apps/options/perception_options.h"
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "apps/command.h"
@@ -10,6 +11,20 @@
 #include "io/files/text_input.h"
 
 namespace felt::apps {
+namespace {
+
+/// Names a network by its description and its weights.
+std::string content_of_network(const std::filesystem::path& description) {
+  ContentHash hash;
+  hash.add(read_whole_file(description));
+  std::ifstream weights(read_net_description(description).file, std::ios::binary);
+  for (std::string part(size_t(1) << 20, '\0');
+       weights.read(part.data(), std::streamsize(part.size())), weights.gcount() > 0;)
+    hash.add(std::string_view(part).substr(0, size_t(weights.gcount())));
+  return hash.digits();
+}
+
+}  // namespace
 
 void add_perception_options(CLI::App& command, PerceptionSettings& settings, const std::string& net_option) {
   const Perception standard;
@@ -76,7 +91,7 @@ nlohmann::ordered_json to_json(const PerceptionSettings& settings) {
   nlohmann::ordered_json json;
   if (!settings.network.empty()) {
     json["segmenter"] = settings.network.string();
-    json["segmenter_content"] = content_hash(read_whole_file(settings.network));
+    json["segmenter_content"] = content_of_network(settings.network);
   }
   json["top"] = settings.top.value_or(standard.top);
   json["vote"] = name_of(kSegmentSourceNames, settings.vote.value_or(standard.vote));

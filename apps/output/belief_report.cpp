@@ -53,12 +53,15 @@ json point_json(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z()}; }
 json class_json(const Map& map, const Belief& belief) {
   json out = json::object();
   if (map.classes.size() > 0) {
-    out["class"] = map.classes.at_slot(most_probable_class(belief.class_probability)).name;
+    const double all = std::accumulate(belief.concentration.begin(), belief.concentration.end(), 0.0);
+    const double evidence = std::max(0.0, all - map.classes.prior_total());
+    // Where nothing was seen, the most probable class is just the first one.
+    out["class"] = nullptr;
+    if (evidence > 0) out["class"] = map.classes.at_slot(most_probable_class(belief.class_probability)).name;
     for (int c = 0; c < map.classes.size(); ++c)
       out["class_probability"][map.classes.at_slot(c).name] = belief.class_probability[size_t(c)];
     out["class_entropy"] = class_entropy(belief.class_probability);
-    const double all = std::accumulate(belief.concentration.begin(), belief.concentration.end(), 0.0);
-    out["class_evidence"] = std::max(0.0, all - map.classes.prior_total());
+    out["class_evidence"] = evidence;
   }
   return out;
 }

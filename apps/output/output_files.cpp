@@ -87,6 +87,9 @@ std::string missing_from(const Map& map, const Map& older, LostTouches touches) 
   return "";
 }
 
+/// Where a file lies, also where it is named without a folder.
+fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
+
 }  // namespace
 
 void prepare_output_folder(const fs::path& folder) {
@@ -158,10 +161,9 @@ void warn_if_coarse(const TriangleMesh& mesh, const fs::path& file) {
 }
 
 MapWriting::MapWriting(const fs::path& file, bool overwrite)
-    : folder_(file.has_parent_path() ? file.parent_path() : fs::path("."), FileLock::Kind::shared, 1),
-      file_(file, FileLock::Kind::exclusive, 60) {
+    : folder_(folder_of(linked_file(file)), FileLock::Kind::shared, 1), file_(file, FileLock::Kind::exclusive, 60) {
   require_writable(file, overwrite);
-  remove_abandoned_parts(file);
+  remove_abandoned_parts(linked_file(file));
 }
 
 }  // namespace felt::apps

@@ -49,10 +49,10 @@ struct MixtureBatch {
 /// way tau moved), with L the largest |log evidence| among the classes that matter: 1e-5 + 1e-6 L for tau, kappa, beta,
 /// gamma and r (f32 keeps a log evidence to 2e-7 of itself, so a reading that every class finds thousands of nats
 /// surprising moves r by more). For a: 2e-5 with concentrations of 1 and above in the prior; otherwise 2e-5 and what
-/// that error of r, and two roundings of r/a, do to the exact solution, which is much where all classes but one are
-/// rare (1e-3 beside 1e6) and little determines the sum: docs/batch_kernels.md has the formula. `published`: as `kl`
-/// where 1/kappa^ is no near-cancelling sum. The targets with fused multiply-add (avx2, avx3) give the same bits; sse4
-/// differs within the bound; "scalar" is f64 rounded once.
+/// that error of r, and two roundings of r/a, do to the exact solution, up to 1e-3 where all classes
+/// but one are rare (1e-4 beside 10) and little determines the sum: docs/batch_kernels.md has the formula. `published`:
+/// as `kl` where 1/kappa^ is no near-cancelling sum. The targets with fused multiply-add (avx2, avx3) give the same
+/// bits; sse4 differs within the bound; "scalar" is f64 rounded once.
 BatchCounts update_mixture(const MixtureBatch& batch, double psi, double noise_sd = 0,
                            Projection projection = Projection::kl) noexcept;
 

@@ -45,14 +45,21 @@ void AtomicFile::fail(const char* step, int error) const {
   throw IoError(shown_.string() + ": cannot " + step + ": " + std::strerror(error));
 }
 
-AtomicFile::AtomicFile(const fs::path& destination) : shown_(destination), destination_(destination) {
+fs::path linked_file(fs::path path) {
+  constexpr int kMostLinks = 40;
+  std::error_code error;
+  for (int links = 0; links < kMostLinks && fs::is_symlink(path, error); ++links) {
+    const fs::path target = fs::read_symlink(path, error);
+    if (error) break;
+    path = target.is_absolute() ? target : path.parent_path() / target;
+  }
+  return path;
+}
+
+AtomicFile::AtomicFile(const fs::path& destination) : shown_(destination), destination_(linked_file(destination)) {
   if (destination.filename().empty())
     throw IoError(describe_mismatch(destination.string(), "output", "a file name", "none"));
-  std::error_code error;
-  if (fs::is_symlink(destination, error)) {
-    const fs::path target = fs::weakly_canonical(destination, error);
-    if (!error) destination_ = target;
-  }
+  if (std::error_code error; fs::is_symlink(destination_, error)) fail("follow its links", ELOOP);
   struct stat existing {};
   const bool replaces = stat(destination_.c_str(), &existing) == 0;
   if (replaces && !S_ISREG(existing.st_mode))

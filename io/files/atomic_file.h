@@ -8,6 +8,10 @@
 
 namespace felt {
 
+/// The file that a path names in the end, through symbolic links, whether it exists or not. A link that leads nowhere
+/// (a ring) is returned itself.
+std::filesystem::path linked_file(std::filesystem::path path);
+
 /// A file that appears whole or not at all. It is written beside its destination under a name that ends in the same
 /// extension; `commit` flushes it to the disk and renames it over the destination, and destruction without `commit`
 /// removes it, so that an older file stays intact until the new one is whole.

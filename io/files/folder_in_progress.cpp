@@ -1,20 +1,36 @@
 #include "io/files/folder_in_progress.h"
 
 #include <stdlib.h>
+#include <sys/stat.h>
 
 #include <cerrno>
 #include <cstring>
+#include <optional>
 #include <string>
-#include <utility>
 
 #include "core/error.h"
 
 namespace felt {
 namespace fs = std::filesystem;
 
-FolderInProgress::FolderInProgress(fs::path destination) : destination_(std::move(destination)) {
+namespace {
+
+std::optional<dev_t> device_of(const fs::path& path) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) != 0) return std::nullopt;
+  return status.st_dev;
+}
+
+}  // namespace
+
+FolderInProgress::FolderInProgress(const fs::path& destination)
+    : destination_(fs::absolute(destination).lexically_normal()) {                 // "." has a name, too
   if (destination_.filename().empty()) destination_ = destination_.parent_path();  // "name/" is "name"
-  const fs::path parent = destination_.has_parent_path() ? destination_.parent_path() : ".";
+  const fs::path parent = destination_.parent_path();
+  // Such a folder cannot be replaced by another one; better said before the work than after.
+  if (const auto here = device_of(destination_), around = device_of(parent); here && around && *here != *around)
+    throw IoError(describe_mismatch(destination.string(), "output folder", "one that can be made or replaced",
+                                    "a mount point (a folder within it will do)"));
   std::string pattern =
       (parent / fs::path(".").concat(destination_.filename().string()).concat(".partial-XXXXXX")).string();
   if (mkdtemp(pattern.data()) == nullptr)

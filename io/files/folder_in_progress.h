@@ -8,8 +8,9 @@ namespace felt {
 /// destination under a name that nobody else has.
 class FolderInProgress {
 public:
-  /// Throws IoError where no folder can be made beside `destination`, such as where that place does not exist.
-  explicit FolderInProgress(std::filesystem::path destination);
+  /// Throws IoError where no folder can be made beside `destination`, such as where that place does not exist, and
+  /// where the destination is a mount point.
+  explicit FolderInProgress(const std::filesystem::path& destination);
   ~FolderInProgress();
   FolderInProgress(const FolderInProgress&) = delete;
   FolderInProgress& operator=(const FolderInProgress&) = delete;

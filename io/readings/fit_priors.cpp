@@ -60,15 +60,32 @@ std::vector<ClassReadings> read_readings_csv(const std::filesystem::path& file) 
   return classes;
 }
 
+namespace {
+
+/// Fits in the order of the classes; those of one group take the correlation of the others.
+std::vector<std::optional<PriorFit>> fits_of(const std::vector<ClassReadings>& classes, double max_nu_0) {
+  std::vector<PriorFit> alone;
+  for (const ClassReadings& c : classes)
+    if (const std::optional<PriorFit> fit = fit_prior(c.groups, max_nu_0)) alone.push_back(*fit);
+  const std::optional<double> rho = pooled_rho(alone);
+  std::vector<std::optional<PriorFit>> fits;
+  for (const ClassReadings& c : classes) fits.push_back(fit_prior(c.groups, max_nu_0, rho));
+  return fits;
+}
+
+}  // namespace
+
 PropertyTable fitted_properties(const std::vector<ClassReadings>& classes, Property property) {
   std::vector<PriorFit> fits;
-  for (const ClassReadings& c : classes) {
+  const std::vector<std::optional<PriorFit>> of_class = fits_of(classes, property.max_prior_readings);
+  for (size_t i = 0; i < classes.size(); ++i) {
+    const ClassReadings& c = classes[i];
     for (const std::vector<double>& group : c.groups)
       for (const double value : group)
         if (value < property.support_lo || value > property.support_hi)
           throw ConfigError(describe_mismatch("priors", "reading of '" + c.name + "'", "a value in the support",
                                               std::to_string(value)));
-    const std::optional<PriorFit> fit = fit_prior(c.groups, property.max_prior_readings);
+    const std::optional<PriorFit>& fit = of_class[i];
     if (!fit) continue;
     fits.push_back(*fit);
     property.priors[c.name] = {fit->mean, fit->sd, fit->effective_readings};
@@ -83,8 +100,10 @@ std::string fit_priors_json(const std::vector<ClassReadings>& classes, double ma
   ordered_json out{{"classes", ordered_json::array()}};
   std::vector<PriorFit> fits;
   std::vector<std::string> names;
-  for (const ClassReadings& c : classes) {
-    const std::optional<PriorFit> fit = fit_prior(c.groups, max_nu_0);
+  const std::vector<std::optional<PriorFit>> of_class = fits_of(classes, max_nu_0);
+  for (size_t i = 0; i < classes.size(); ++i) {
+    const ClassReadings& c = classes[i];
+    const std::optional<PriorFit>& fit = of_class[i];
     if (!fit) {
       out["classes"].push_back(
           {{"class", c.name}, {"error", "readings: expected at least two that differ, found fewer"}});
@@ -92,16 +111,18 @@ std::string fit_priors_json(const std::vector<ClassReadings>& classes, double ma
     }
     fits.push_back(*fit);
     names.push_back(c.name);
-    out["classes"].push_back({{"class", c.name},
-                              {"readings", fit->readings},
-                              {"groups", fit->groups},
-                              {"mean", fit->mean},
-                              {"sd", fit->sd},
-                              {"nu_0", fit->nu_0},
-                              {"rho", fit->rho ? ordered_json(*fit->rho) : ordered_json(nullptr)},
-                              {"effective_readings", fit->effective_readings},
-                              {"ks_distance", fit->ks_distance},
-                              {"normal_is_plausible", fit->normal_is_plausible}});
+    out["classes"].push_back(
+        {{"class", c.name},
+         {"readings", fit->readings},
+         {"groups", fit->groups},
+         {"mean", fit->mean},
+         {"sd", fit->sd},
+         {"nu_0", fit->nu_0},
+         {"rho", fit->rho ? ordered_json(*fit->rho) : ordered_json(nullptr)},
+         {"assumed_rho", fit->assumed_rho ? ordered_json(*fit->assumed_rho) : ordered_json(nullptr)},
+         {"effective_readings", fit->effective_readings},
+         {"ks_distance", fit->ks_distance},
+         {"normal_is_plausible", fit->normal_is_plausible}});
   }
   const std::optional<double> rho = pooled_rho(fits);
   out["rho"] = rho ? ordered_json(*rho) : ordered_json(nullptr);

@@ -202,7 +202,7 @@ public:
     if (!generic || from_zero_ || info_.touches_file.empty()) return copy(info_.touches_file, "touches.csv", false);
     int64_t elsewhere = 0;
     put("touches.csv", touches_text(info_.touches_file, elsewhere));
-    if (elsewhere > 0) result.left_out.push_back(std::to_string(elsewhere) + " touches of frames that are not written");
+    result.touches_elsewhere = elsewhere;
   }
 
   /// Stored units per metre.

@@ -28,6 +28,7 @@ struct ConvertResult {
   std::map<std::string, int64_t> skipped;  ///< frames that could not be read, by reason
   int64_t depth_measured = 0;              ///< pixels that have depth
   int64_t depth_out_of_range = 0;          ///< of those: too far for 16 bits or too near at the scale, stored as 0
+  int64_t touches_elsewhere = 0;           ///< recorded touches of frames that are not written, left out
   std::vector<std::string> left_out;       ///< what the sequence carries and the layout has no place for
 };
 

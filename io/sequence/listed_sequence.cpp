@@ -90,6 +90,7 @@ ListedSequence::ListedSequence(const fs::path& path, const SequenceOptions& opti
   info_.fingerprint = fingerprint(listing_);
   info_.content = frames_content(listing_);
   info_.camera = find_depth_camera(listing_, path);
+  info_.reading = reading_text(listing_, info_.camera);
 
   select_frames(options.frames, listing_);
   const auto any = [&](auto test) { return std::any_of(listing_.frames.begin(), listing_.frames.end(), test); };

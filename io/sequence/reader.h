@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <variant>
@@ -42,7 +43,10 @@ struct SequenceInfo {
   /// Which recording it is (io/sequence/sequence_fingerprint.h), wherever it lies and whatever of it is selected, also
   /// after it grew.
   std::string fingerprint;
-  std::string content;                       ///< of all its frames: another one after it grew or changed
+  std::string content;  ///< of all its frames: another one after it grew or changed
+  /// How its files are understood (camera, depth scale, convention of the poses, ...) and which label images it has, as
+  /// text by name: the same where the same frames would be read.
+  std::map<std::string, std::string> reading;
   double voxel_size_m = 0, max_depth_m = 0;  ///< what suits the sensor; 0: nothing else than usual
   std::vector<std::string> notes;            ///< what was assumed or repaired, one sentence each
 };

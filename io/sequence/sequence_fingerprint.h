@@ -1,7 +1,9 @@
 #pragma once
 
+#include <map>
 #include <string>
 
+#include "core/camera.h"
 #include "io/sequence/sequence_listing.h"
 
 namespace felt {
@@ -16,5 +18,8 @@ std::string fingerprint(const SequenceListing& listing);
 
 /// The same of all frames: another one as soon as any frame came, went or changed.
 std::string frames_content(const SequenceListing& listing);
+
+/// SequenceInfo::reading. Label, probability and instance images go by their sizes and the bytes of the first of them.
+std::map<std::string, std::string> reading_text(const SequenceListing& listing, const PinholeCamera& camera);
 
 }  // namespace felt

@@ -59,8 +59,11 @@ void copy_observed(const Block& from, const BlockMask& inside, BlockStore& store
 }  // namespace
 
 Region voxels_in(const Map& map, const Eigen::AlignedBox3d& box_m) {
+  // Bounds that were written as decimals and centres that are multiples of the voxel size differ in their last bits.
+  const Eigen::Vector3d rounding = Eigen::Vector3d::Constant(1e-6 * map.voxel_size_m);
+  const Eigen::AlignedBox3d reach(box_m.min() - rounding, box_m.max() + rounding);
   return observed_where(map, [&](const VoxelRef& voxel) {
-    return box_m.contains(center_m(map, map.store[voxel.block].coord, voxel.offset));
+    return reach.contains(center_m(map, map.store[voxel.block].coord, voxel.offset));
   });
 }
 

@@ -134,6 +134,14 @@ std::vector<uint32_t> covering_touches(const Map& map, const Region& region) {
   return touches;
 }
 
+size_t touches_of_a_part(const Map& map, const Region& region) {
+  const size_t voxels = region.voxels();
+  return size_t(std::count_if(map.touches.touches.begin(), map.touches.touches.end(), [&](const Touch& touch) {
+    const size_t both = touch.undone ? 0 : voxels_in_both(touch.region, region);
+    return both > 0 && 2 * both <= voxels;
+  }));
+}
+
 bool any_mixture(const Map& map, const std::vector<uint32_t>& touches) {
   return std::any_of(touches.begin(), touches.end(),
                      [&](uint32_t t) { return map.touches.touches[t].request.model == TouchModel::mixture; });

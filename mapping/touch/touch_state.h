@@ -29,6 +29,9 @@ Region material_reach(const Map& map, const std::vector<uint32_t>& touches, Regi
 std::vector<uint32_t> covering_touches(const Map& map, const Index3& voxel);
 /// Those that cover more than half of a region: they speak for it as a whole, others for a part of it.
 std::vector<uint32_t> covering_touches(const Map& map, const Region& region);
+/// How many active touches reach into a region and cover no more than half of it: what is believed of the region as a
+/// whole leaves them out.
+size_t touches_of_a_part(const Map& map, const Region& region);
 
 /// Whether one of these touches (places in the journal) is a `mixture` one.
 bool any_mixture(const Map& map, const std::vector<uint32_t>& touches);

@@ -110,9 +110,110 @@ TEST_CASE("a run goes on although its files are named in another way") {
   fs::rename(labels, folder / "others");
   std::string elsewhere = options(folder.string() + "/");
   elsewhere.replace(elsewhere.find("labels --classes"), 6, "others/");
+  CHECK(recording.reconstruct(elsewhere + " --resume").exit_code == 0);
+  write_bytes(folder / "others" / "2.png", encode_png(Image<uint16_t>(24, 16, 1)));
   const CommandResult others = recording.reconstruct(elsewhere + " --resume");
   CHECK(others.exit_code == 3);
-  CHECK_THAT(others.err, Contains("labels: expected") && Contains("others"));
+  CHECK_THAT(others.err, Contains("label images: expected those that") && Contains("found others"));
+}
+
+TEST_CASE("a run does not go on when its recording is understood in another way, or has other labels") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const std::string before = file_text(recording.map);
+  const fs::path yaml = recording.sequence / "sequence.yaml";
+  const std::string as_recorded = file_text(yaml);
+  const auto refused_with = [&](const std::string& text, const std::string& reason) {
+    write_text(yaml, text);
+    const CommandResult result = recording.reconstruct("--resume");
+    INFO(result.err);
+    CHECK(result.exit_code == 3);
+    CHECK_THAT(result.err, Contains("--resume: the recording's " + reason));
+  };
+  const std::string scaled = "camera: {fx: 20, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16}\ndepth_scale: 2500\n";
+  refused_with(scaled, "depth scale: expected \"2000.0\" as in");
+  refused_with("camera: {fx: 21, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16}\ndepth_scale: 2000\n", "camera");
+  refused_with(as_recorded + "depth_is_ray_length: true\n", "depth along rays");
+  refused_with(as_recorded + "pose_convention: opengl\n", "pose convention");
+  write_text(yaml, as_recorded);
+  CHECK(recording.reconstruct("--resume").exit_code == 0);
+  fs::remove_all(recording.sequence / "labels");
+  fs::copy_file(recording.sequence / "classes.yaml", recording.folder.path() / "classes.yaml");
+  const CommandResult unlabelled = recording.reconstruct("--resume");
+  CHECK(unlabelled.exit_code == 3);
+  CHECK_THAT(unlabelled.err, Contains("label images"));
+  CHECK(file_text(recording.map) == before);
+}
+
+TEST_CASE("a map that is named by a link is as safe as by its own name") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const std::string before = file_text(recording.map);
+  fs::create_directory(recording.folder.path() / "links");
+  const fs::path link = recording.folder.path() / "links" / "latest.vdb";
+  fs::create_symlink("../result/map.vdb", link);
+  {
+    const FileLock at_work(recording.out, FileLock::Kind::exclusive, 0);
+    refused(recording.touch("0.4", link), 4, "another feltmap");
+  }
+  CHECK(file_text(recording.map) == before);
+  REQUIRE(run_feltmap(recording.touch("0.4", link)).exit_code == 0);
+  CHECK(fs::is_symlink(link));
+  CHECK(load_map(recording.map).touches.touches.size() == 1);
+  // And where there is nothing yet at the other end.
+  const fs::path ahead = recording.folder.path() / "links" / "ahead.vdb";
+  fs::create_symlink("../result/later.vdb", ahead);
+  REQUIRE(run_feltmap("merge " + quoted(recording.map) + " --out " + quoted(ahead)).exit_code == 0);
+  CHECK(fs::is_symlink(ahead));
+  CHECK(load_map(recording.out / "later.vdb").touches.touches.size() == 1);
+}
+
+TEST_CASE("merging says which touches count again that one of the maps took back") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  REQUIRE(run_feltmap(recording.touch()).exit_code == 0);
+  const fs::path undone = recording.out / "undone.vdb", both = recording.out / "both.vdb";
+  const std::string id = id_text(load_map(recording.map).touches.touches.front().id);
+  REQUIRE(run_feltmap("touch " + quoted(recording.map) + " --undo " + id + " --out " + quoted(undone)).exit_code == 0);
+  const CommandResult merged = run_feltmap("merge " + quoted(recording.map) + " " + quoted(undone) + " --out " +
+                                           quoted(both) + " --allow-shared-frames");
+  INFO(merged.err);
+  REQUIRE(merged.exit_code == 0);
+  CHECK_THAT(merged.err, Contains("undone in one of the maps") && Contains(id));
+  CHECK_FALSE(load_map(both).touches.touches.front().undone);
+  refused("merge " + quoted(recording.map) + " --max-weight 0.5 --out " + quoted(both) + " --force", 2, "--max-weight");
+}
+
+TEST_CASE("a touch by the frame of another recording is said to be one") {
+  const Recording recording, other(9);
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  CHECK_THAT(run_feltmap(recording.touch()).err, !Contains("other recordings"));
+  write_text(other.sequence / "poses.txt", file_text(recording.sequence / "poses.txt"));
+  const CommandResult result =
+      run_feltmap("touch " + quoted(recording.map) + " --sequence " + quoted(other.sequence) +
+                  " --frame 0 --pixel 12,8 --region sphere --radius 0.3 --property friction --value 0.4 --stamp 1");
+  CHECK(result.exit_code == 2);  // a frame has a time of its own
+  const CommandResult there =
+      run_feltmap("touch " + quoted(recording.map) + " --sequence " + quoted(other.sequence) +
+                  " --frame 1 --pixel 12,8 --region sphere --radius 0.3 --property friction --value 0.4");
+  INFO(there.err);
+  CHECK(there.exit_code == 0);
+  CHECK_THAT(there.err, Contains("was made of other recordings"));
+}
+
+TEST_CASE("a checkpoint that replaces a map leaves no mesh of another one beside it") {
+  const Recording recording(12);
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const CommandResult stopped =
+      run_feltmap_within("",
+                         "reconstruct " + quoted(recording.sequence) + " --out " + quoted(recording.out) +
+                             " --voxel-size 0.05 --quiet --force --checkpoint 2 --threads 1",
+                         " & pid=$!; while [ -e " + quoted(recording.out / "mesh.ply") +
+                             " ]; do kill -0 $pid 2>/dev/null || break; done; kill -9 $pid 2>/dev/null; wait $pid");
+  CHECK(load_map(recording.map).frames.runs.size() == 1);
+  if (stopped.exit_code == 0) return;  // the run was sooner: its own mesh lies there
+  CHECK_FALSE(fs::exists(recording.out / "mesh.ply"));
+  CHECK_FALSE(fs::exists(recording.out / "report.json"));
 }
 
 TEST_CASE("touches that come after a complete run are said not to be applied") {
@@ -313,7 +414,7 @@ TEST_CASE("no run goes on with a merged map, of one map or of equal ones") {
   const fs::path copy = recording.folder.path() / "copy.vdb", merged = recording.folder.path() / "merged" / "map.vdb";
   fs::copy_file(recording.map, copy);
   fs::create_directory(merged.parent_path());
-  for (const std::string maps : {quoted(copy), quoted(copy) + " " + quoted(recording.map) + " --allow-shared-frames"}) {
+  for (const std::string& maps : {quoted(copy), quoted(copy) + " " + quoted(recording.map) + " --allow-shared-frames"}) {
     REQUIRE(run_feltmap("merge --force " + maps + " --out " + quoted(merged)).exit_code == 0);
     refused("reconstruct " + quoted(recording.sequence) + " --voxel-size 0.05 --resume --out " +
                 quoted(merged.parent_path()),

@@ -123,6 +123,37 @@ TEST_CASE("segment does not mix images of different settings") {
   CHECK(fs::exists(setting.folder.path() / "mine"));
 }
 
+TEST_CASE("segment deletes no images that it reads or that no run of it wrote, and sees that labels changed") {
+  const Setting setting;
+  const fs::path recording = setting.folder.path() / "recording", out = setting.out;
+  fs::copy(setting.sequence, recording, fs::copy_options::recursive);
+  const auto voted = [&](const fs::path& into, const std::string& more = "") {
+    return run_feltmap("segment " + quoted(recording) + " --vote geometric --frames 0:2 --out " + quoted(into) + " " +
+                       more);
+  };
+  const CommandResult itself = voted(recording, "--force");
+  CHECK(itself.exit_code == 3);
+  CHECK_THAT(itself.err, Catch::Matchers::Contains("a folder of its own"));
+  CHECK(fs::exists(recording / "labels" / "000000.png"));
+  const fs::path mine = setting.folder.path() / "mine";
+  fs::create_directory(mine);
+  fs::copy(recording / "labels", mine / "labels");
+  CHECK(voted(mine, "--force").exit_code == 4);
+  CHECK(voted(mine, "--force --labels " + quoted(mine / "labels")).exit_code == 3);
+  CHECK(fs::exists(mine / "labels" / "000000.png"));
+  REQUIRE(voted(out).exit_code == 0);
+  CHECK(voted(out, "--labels " + quoted(mine / "labels")).exit_code == 0);  // the same images, elsewhere
+  fs::copy_file(recording / "labels" / "000005.png", recording / "labels" / "000000.png",
+                fs::copy_options::overwrite_existing);
+  const CommandResult changed = voted(out);
+  CHECK(changed.exit_code == 3);
+  CHECK_THAT(changed.err, Catch::Matchers::Contains("segment.json"));
+  // What a run left that was stopped before its state was written is as good as nothing.
+  const fs::path stopped = setting.folder.path() / "stopped";
+  fs::create_directories(stopped / "labels");
+  CHECK(voted(stopped).exit_code == 0);
+}
+
 TEST_CASE("a map does not depend on the number of threads that run the network") {
   const Setting setting;
   std::string hash;

@@ -110,6 +110,25 @@ TEST_CASE("a query answers between voxel centres, and its figures of a forecast 
   }
 }
 
+TEST_CASE("beside what was not observed a query still interpolates along an edge, or says that it does not") {
+  const TemporaryDirectory folder;
+  const std::string file = (folder.path() / "edge.vdb").string();
+  Map map(0.1, 0.4);
+  Block& block = map.store[map.store.find_or_create({0, 0, 0})];
+  for (const auto& [voxel, tsdf] : {std::pair(Index3{2, 2, 2}, 0.06f), {Index3{2, 3, 2}, -0.04f}}) {
+    block.geometry->weight[offset_in_block(voxel)] = 1;
+    block.geometry->tsdf[offset_in_block(voxel)] = tsdf;
+  }
+  save_map(map, file);
+  const auto at = [&](const std::string& point) { return ask("query " + file + " --at " + point)["points"][0]; };
+  CHECK(at("0.2,0.26,0.2")["signed_distance_m"].get<double>() == Approx(0).margin(1e-7));
+  CHECK(at("0.200001,0.26,0.2")["signed_distance_m"].get<double>() == Approx(0).margin(1e-6));
+  CHECK(at("0.2,0.26,0.2")["interpolated"] == true);
+  CHECK(at("0.21,0.24,0.2")["interpolated"] == false);
+  CHECK(at("0.21,0.24,0.2")["signed_distance_m"].get<double>() == Approx(0.06).epsilon(1e-6));
+  CHECK_THAT(run_feltmap("query " + file + " --at 0.21,0.24,0.2").out, Catch::Contains("of the nearest voxel"));
+}
+
 TEST_CASE("the error of a forecast is that of the mean that a query gives there") {
   const TemporaryDirectory folder;
   const std::string map = save_floor(folder), csv = (folder.path() / "held_out.csv").string();

@@ -122,6 +122,17 @@ TEST_CASE("a belief floor leaves no class below it and keeps the sum") {
   CHECK(belief[3] / belief[2] == Approx(4).epsilon(1e-12));
 }
 
+TEST_CASE("a mode is where the density has its maximum, between the points that were looked at") {
+  const StudentTMixture m{{0.7, 0.3}, {{0.0, 1.0, 8}, {1.2, 2.0, 8}}};
+  const std::vector<double> found = modes(m);
+  REQUIRE(found.size() == 1);
+  CHECK(found[0] > 0.01);
+  for (const double step : {1e-4, 1e-3, 1e-2}) {
+    CHECK(pdf(m, found[0]) > pdf(m, found[0] - step));
+    CHECK(pdf(m, found[0]) > pdf(m, found[0] + step));
+  }
+}
+
 TEST_CASE("two humps count as two modes only when a dip parts them") {
   CHECK(modes(pair_at_distance(1)).size() == 1);
   CHECK(modes(pair_at_distance(2.1)).size() == 1);

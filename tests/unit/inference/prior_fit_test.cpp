@@ -72,6 +72,14 @@ TEST_CASE("without groups there is no correlation to find, and one reading is no
   REQUIRE(fit);
   CHECK_FALSE(fit->rho);
   CHECK(fit->nu_0 == 3);
+  // With the correlation of other classes three readings of one group are 3/(1 + 2 rho), and of its variance 1 - rho.
+  const auto with_others = fit_prior({{0.1, 0.2, 0.4}}, 50, 0.5);
+  REQUIRE(with_others);
+  CHECK_FALSE(with_others->rho);
+  CHECK(*with_others->assumed_rho == 0.5);
+  CHECK(with_others->effective_readings == Approx(1.5));
+  CHECK(with_others->sd == Approx(fit->sd * std::sqrt(2)));
+  CHECK_FALSE(fit_prior({{0.1, 0.2}, {0.4, 0.3}}, 50, 0.5)->assumed_rho);
   CHECK_FALSE(fit_prior({{0.1}}));
   CHECK_FALSE(fit_prior({{0.1, 0.1}}));
   CHECK_FALSE(fit_prior({}));

@@ -63,6 +63,19 @@ TEST_CASE("a library may write the temporary file under its path") {
   CHECK(content(folder.path() / "x.png") == "pixels");
 }
 
+TEST_CASE("a link that leads to nothing yet names the file that is made, and a ring of links names none") {
+  const test::TemporaryDirectory folder;
+  fs::create_directory(folder.path() / "there");
+  const fs::path link = folder.path() / "link.ply", ring = folder.path() / "ring.ply";
+  fs::create_symlink("there/real.ply", link);
+  write_file_atomically(link, "new");
+  CHECK(fs::is_symlink(link));
+  CHECK(fs::is_regular_file(folder.path() / "there" / "real.ply"));
+  fs::create_symlink("ring.ply", ring);
+  CHECK_THROWS_AS(write_file_atomically(ring, "new"), IoError);
+  CHECK(fs::is_symlink(ring));
+}
+
 TEST_CASE("a replaced file keeps its permissions, and a link stays a link") {
   const test::TemporaryDirectory folder;
   const fs::path real = folder.path() / "real.ply", link = folder.path() / "link.ply";

@@ -79,6 +79,16 @@ TEST_CASE("a crop to everything has the hash of the map, a crop to nothing has n
   CHECK(cropped(map, voxels_in(map, elsewhere)).store.empty());
 }
 
+TEST_CASE("a box that is given in decimals holds the voxels on its bounds") {
+  Map map(0.05, 0.2);
+  const uint32_t number = map.store.find_or_create({0, 0, 0});
+  for (int i = 0; i < kBlockVoxels; ++i) map.store[number].geometry->weight[i] = 1;
+  // 3 * 0.05 and 7 * 0.05 are a little more than 0.15 and 0.35 in doubles.
+  REQUIRE(3 * map.voxel_size_m > 0.15);
+  const Region inside = voxels_in(map, {Eigen::Vector3d(0.05, 0.05, 0.05), Eigen::Vector3d(0.15, 0.35, 0.15)});
+  CHECK(inside.voxels() == 3 * 7 * 3);
+}
+
 TEST_CASE("the bounds of a map are the outermost centres of observed voxels") {
   Map map = two_blocks();
   Block& second = map.store[map.store.find({1, 0, 0})];
