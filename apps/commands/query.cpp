@@ -154,7 +154,7 @@ int run_query(const QueryOptions& options) {
     }
     std::printf("distance %.4f m%s, weight %g", a["signed_distance_m"].get<double>(),
                 a["interpolated"].get<bool>() ? "" : " of the nearest voxel", a["weight"].get<double>());
-    if (a.contains("class") && !(a["class_evidence"].get<double>() > 0))
+    if (a.contains("class") && a["class"].is_null())
       std::printf(", class unknown: no label was seen there");
     else if (a.contains("class"))
       std::printf(", %s %.3f, entropy %.3f", a["class"].get<std::string>().c_str(),

@@ -312,7 +312,7 @@ int run(const ReconstructArguments& arguments, CommonOptions common) {
     saved_after = report.fusion.read;
     // A mesh and a report of another map do not lie beside it.
     std::error_code ignored;
-    for (const char* name : {kMeshName, kReportName}) fs::remove(options.out / name, ignored);
+    for (const char* name : {kReportName, kMeshName}) fs::remove(options.out / name, ignored);
   };
   fuse(*sequence, source, *perception.times, options, classes.ignored_ids, common, interrupt, save_on_the_way, map,
        scratch, report.fusion);

@@ -34,10 +34,9 @@ void require_bands_that_fit(const ReconstructOptions& options) {
 void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
   command.add_option("SEQUENCE", a.sequence, "Folder of a recorded RGB-D sequence, or a .sens file")->required();
   command.add_option("--out", a.out, "Folder for map.vdb, mesh.ply and report.json")->required();
-  command.add_flag("--force", a.overwrite,
-                   "Replace results that exist there: the map by the first checkpoint, by what was fused when a run is "
-                   "stopped, or by "
-                   "the whole one");
+  command.add_flag(
+      "--force", a.overwrite,
+      "Replace results that exist there, the map already by a checkpoint or by what a stopped run had fused");
   command
       .add_option("--checkpoint", a.checkpoint_every,
                   "Save the map every so many frames, so that no accident loses more than those; 0: at the end only")

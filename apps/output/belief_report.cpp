@@ -55,9 +55,11 @@ json class_json(const Map& map, const Belief& belief) {
   if (map.classes.size() > 0) {
     const double all = std::accumulate(belief.concentration.begin(), belief.concentration.end(), 0.0);
     const double evidence = std::max(0.0, all - map.classes.prior_total());
-    // Where nothing was seen, the most probable class is just the first one.
+    // Where nothing was seen or felt, the most probable class is just the first one.
+    const bool informed =
+        evidence > 0 || std::any_of(belief.readings.begin(), belief.readings.end(), [](double n) { return n > 0; });
     out["class"] = nullptr;
-    if (evidence > 0) out["class"] = map.classes.at_slot(most_probable_class(belief.class_probability)).name;
+    if (informed) out["class"] = map.classes.at_slot(most_probable_class(belief.class_probability)).name;
     for (int c = 0; c < map.classes.size(); ++c)
       out["class_probability"][map.classes.at_slot(c).name] = belief.class_probability[size_t(c)];
     out["class_entropy"] = class_entropy(belief.class_probability);

@@ -24,8 +24,9 @@ std::optional<dev_t> device_of(const fs::path& path) {
 }  // namespace
 
 FolderInProgress::FolderInProgress(const fs::path& destination)
-    : destination_(fs::absolute(destination).lexically_normal()) {                 // "." has a name, too
-  if (destination_.filename().empty()) destination_ = destination_.parent_path();  // "name/" is "name"
+    : destination_(fs::absolute(destination).lexically_normal()) {
+  // "name/" is "name", and "." has a name, too.
+  if (destination_.filename().empty()) destination_ = destination_.parent_path();
   const fs::path parent = destination_.parent_path();
   // Such a folder cannot be replaced by another one; better said before the work than after.
   if (const auto here = device_of(destination_), around = device_of(parent); here && around && *here != *around)

@@ -414,7 +414,8 @@ TEST_CASE("no run goes on with a merged map, of one map or of equal ones") {
   const fs::path copy = recording.folder.path() / "copy.vdb", merged = recording.folder.path() / "merged" / "map.vdb";
   fs::copy_file(recording.map, copy);
   fs::create_directory(merged.parent_path());
-  for (const std::string& maps : {quoted(copy), quoted(copy) + " " + quoted(recording.map) + " --allow-shared-frames"}) {
+  for (const std::string& maps :
+       {quoted(copy), quoted(copy) + " " + quoted(recording.map) + " --allow-shared-frames"}) {
     REQUIRE(run_feltmap("merge --force " + maps + " --out " + quoted(merged)).exit_code == 0);
     refused("reconstruct " + quoted(recording.sequence) + " --voxel-size 0.05 --resume --out " +
                 quoted(merged.parent_path()),
