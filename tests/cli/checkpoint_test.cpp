@@ -35,14 +35,15 @@ int64_t last_logged(const std::string& log) {
 
 /// Runs the command and kills it as soon as `map` is there, or is another file than before. The exit code is 0 where
 /// the run was sooner.
-CommandResult killed_at_the_next_checkpoint(const std::string& arguments, const fs::path& map) {
+CommandResult killed_at_the_next_checkpoint(const std::string& arguments, const fs::path& map,
+                                            const std::string& after_s = "0") {
   const TemporaryDirectory folder;
   const fs::path before = folder.path() / "before";
   if (fs::exists(map)) fs::copy_file(map, before);
-  return run_feltmap_within(
-      "", arguments,
-      " & pid=$!; until [ -e " + quoted(map) + " ] && ! cmp -s " + quoted(map) + " " + quoted(before) +
-          "; do kill -0 $pid 2>/dev/null || break; sleep 0.01; done; kill -9 $pid 2>/dev/null; wait $pid");
+  return run_feltmap_within("", arguments,
+                            " & pid=$!; until [ -e " + quoted(map) + " ] && ! cmp -s " + quoted(map) + " " +
+                                quoted(before) + "; do kill -0 $pid 2>/dev/null || break; sleep 0.01; done; sleep " +
+                                after_s + "; kill -9 $pid 2>/dev/null; wait $pid");
 }
 
 size_t parts_in(const fs::path& folder) {
@@ -107,6 +108,19 @@ TEST_CASE(
   }
   CHECK(between > 0);
   WARN(killed << " kills, " << between << " of them between the first checkpoint and the end");
+}
+
+TEST_CASE("a checkpoint that replaces a map leaves no mesh and no report of another one beside it") {
+  const TemporaryDirectory folder;
+  const fs::path sequence = boxes_repeated(folder.path() / "sequence", 40), out = folder.path() / "out";
+  REQUIRE(run_feltmap(reconstruct(sequence, out)).exit_code == 0);
+  REQUIRE(fs::exists(out / "mesh.ply"));
+  const CommandResult killed = killed_at_the_next_checkpoint(
+      reconstruct(sequence, out, "--force --checkpoint 10 --threads 1"), out / "map.vdb", "0.1");
+  REQUIRE(killed.exit_code == 128 + 9);
+  CHECK(frames_in(out / "map.vdb") < 480);
+  CHECK_FALSE(fs::exists(out / "mesh.ply"));
+  CHECK_FALSE(fs::exists(out / "report.json"));
 }
 
 TEST_CASE("a run that was interrupted goes on with --resume to the same map") {

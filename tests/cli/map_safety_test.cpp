@@ -201,21 +201,6 @@ TEST_CASE("a touch by the frame of another recording is said to be one") {
   CHECK_THAT(there.err, Contains("was made of other recordings"));
 }
 
-TEST_CASE("a checkpoint that replaces a map leaves no mesh of another one beside it") {
-  const Recording recording(12);
-  REQUIRE(recording.reconstruct().exit_code == 0);
-  const CommandResult stopped =
-      run_feltmap_within("",
-                         "reconstruct " + quoted(recording.sequence) + " --out " + quoted(recording.out) +
-                             " --voxel-size 0.05 --quiet --force --checkpoint 2 --threads 1",
-                         " & pid=$!; while [ -e " + quoted(recording.out / "mesh.ply") +
-                             " ]; do kill -0 $pid 2>/dev/null || break; done; kill -9 $pid 2>/dev/null; wait $pid");
-  // Where the kill came late, the mesh that lies there is that of the complete new map.
-  const bool complete = json::parse(load_map(recording.map).metadata.at("progress")).at("complete").get<bool>();
-  CHECK((complete || !fs::exists(recording.out / "mesh.ply")));
-  CHECK((complete || !fs::exists(recording.out / "report.json")));
-}
-
 TEST_CASE("touches that come after a complete run are said not to be applied") {
   const Recording recording;
   REQUIRE(recording.reconstruct().exit_code == 0);
