@@ -76,10 +76,10 @@ double rank_one_denominator(std::span<const double> x, const SumOfOthers& sum) {
 }
 
 /// Newton for digamma(out_i) - digamma(S) = E[ln w_i], S = sum out. Unknown: delta_i = out_i - a_i. The residual is
-/// formed from the smaller of two sets of terms, with digamma(a+1) = digamma(a) + 1/a:
-///   [digamma(A + 1) - digamma(a_i + 1)] + (1 - r_i)/a_i - [digamma(S) - digamma(out_i)]        (a class holds nearly
-///   all) [digamma(a_i + delta_i) - digamma(a_i)] - [digamma(S) - digamma(A + 1)] - r_i/a_i          (large
-///   concentrations)
+/// formed from the smaller of two sets of terms, with digamma(a+1) = digamma(a) + 1/a. Where a class holds nearly all:
+///   [digamma(A + 1) - digamma(a_i + 1)] + (1 - r_i)/a_i - [digamma(S) - digamma(out_i)]
+/// and for large concentrations:
+///   [digamma(a_i + delta_i) - digamma(a_i)] - [digamma(S) - digamma(A + 1)] - r_i/a_i
 class DirichletNewton {
 public:
   DirichletNewton(std::span<const double> a, std::span<const double> r, std::span<const double> not_r)

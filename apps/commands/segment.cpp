@@ -101,12 +101,12 @@ void prepare(const SegmentOptions& options, const OutputNames& names, const Sequ
   const fs::path file = options.out / kStateName;
   remove_abandoned_parts(file);
   const std::string state = json_text(state_of(options, sequence), 2) + "\n";
-  const bool goes_on = fs::exists(file) && read_whole_file(file) == state;
-  if (fs::exists(file) && !goes_on && !options.overwrite)
+  const bool has_state = fs::exists(file), goes_on = has_state && read_whole_file(file) == state;
+  if (has_state && !goes_on && !options.overwrite)
     throw ConfigError(describe_mismatch(options.out.string(), "output exists",
                                         "images of the same sequence, network and settings to go on with, or --force",
                                         "others (" + std::string(kStateName) + " says which)"));
-  if (!fs::exists(file) && !options.overwrite && !as_good_as_empty(options.out))
+  if (!has_state && !options.overwrite && !as_good_as_empty(options.out))
     throw IoError(describe_mismatch(options.out.string(), "output exists", "an empty folder, or --force",
                                     "a folder that no earlier run of segment made"));
   require_own_images(options);

@@ -138,7 +138,6 @@ TEST_CASE("a run does not go on when its recording is understood in another way,
   write_text(yaml, as_recorded);
   CHECK(recording.reconstruct("--resume").exit_code == 0);
   fs::remove_all(recording.sequence / "labels");
-  fs::copy_file(recording.sequence / "classes.yaml", recording.folder.path() / "classes.yaml");
   const CommandResult unlabelled = recording.reconstruct("--resume");
   CHECK(unlabelled.exit_code == 3);
   CHECK_THAT(unlabelled.err, Contains("label images"));
