@@ -78,27 +78,30 @@ std::string map_hash(const Map& map) {
   return hexadecimal(h.high64) + hexadecimal(h.low64);
 }
 
-float sample_tsdf(const Map& map, double x, double y, double z, float min_weight) {
-  const double gx = x / map.voxel_size_m, gy = y / map.voxel_size_m, gz = z / map.voxel_size_m;
-  const Index3 base{int32_t(std::floor(gx)), int32_t(std::floor(gy)), int32_t(std::floor(gz))};
-  const double fx = gx - base.x, fy = gy - base.y, fz = gz - base.z;
-  double sum = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const int dx = corner >> 2, dy = (corner >> 1) & 1, dz = corner & 1;
-    const Index3 v{base.x + dx, base.y + dy, base.z + dz};
-    const Block* block = map.store.get(block_of_voxel(v));
-    const int offset = offset_in_block(v);
-    if (block == nullptr || block->geometry->weight[offset] < min_weight)
-      return std::numeric_limits<float>::quiet_NaN();
-    sum += (dx ? fx : 1 - fx) * (dy ? fy : 1 - fy) * (dz ? fz : 1 - fz) * block->geometry->tsdf[offset];
-  }
-  return float(sum);
-}
-
 std::optional<Index3> nearest_voxel(const Map& map, const Eigen::Vector3d& point_m) {
   const Eigen::Vector3d q = point_m / map.voxel_size_m;
   if (!q.allFinite() || q.cwiseAbs().maxCoeff() > 1e9) return std::nullopt;
   return Index3{int32_t(std::lround(q.x())), int32_t(std::lround(q.y())), int32_t(std::lround(q.z()))};
+}
+
+std::optional<double> sample_tsdf(const Map& map, const Eigen::Vector3d& point_m) {
+  constexpr double kLeastShare = 1e-4;  // a point on a mesh is off its edge by the rounding of floats
+  if (!nearest_voxel(map, point_m)) return std::nullopt;
+  const Eigen::Vector3d at = point_m / map.voxel_size_m, base = at.array().floor(), within = at - base;
+  double sum = 0, total = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3i offset(corner >> 2, corner >> 1 & 1, corner & 1);
+    double share = 1;
+    for (int axis = 0; axis < 3; ++axis) share *= offset[axis] == 1 ? within[axis] : 1 - within[axis];
+    if (share < kLeastShare) continue;
+    const Eigen::Vector3i voxel = base.cast<int>() + offset;
+    const Index3 index{voxel.x(), voxel.y(), voxel.z()};
+    const Block* block = map.store.get(block_of_voxel(index));
+    if (block == nullptr || !(block->geometry->weight[offset_in_block(index)] > 0)) return std::nullopt;
+    sum += share * double(block->geometry->tsdf[offset_in_block(index)]);
+    total += share;
+  }
+  return sum / total;
 }
 
 }  // namespace felt

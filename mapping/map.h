@@ -31,13 +31,13 @@ struct Map {
   std::map<std::string, std::string> metadata;
 };
 
-/// Trilinear sample of the signed distance at a world point, metres; NaN where one of the eight voxels around it was
-/// never observed (weight < min_weight).
-float sample_tsdf(const Map& map, double x, double y, double z, float min_weight = 1e-6f);
-
 /// The voxel whose centre is nearest to a world point, observed or not; nothing where the point is no place of a map:
 /// not finite, or beyond 1e9 voxels from the origin.
 std::optional<Index3> nearest_voxel(const Map& map, const Eigen::Vector3d& point_m);
+
+/// Signed distance at a world point, metres: trilinear between the eight voxel centres about it, of which those without
+/// a share in it need not be observed; nothing where another one was not, or where the point is no place of a map.
+std::optional<double> sample_tsdf(const Map& map, const Eigen::Vector3d& point_m);
 
 /// Number of voxels with weight > 0.
 size_t active_voxel_count(const Map& map);

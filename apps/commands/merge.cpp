@@ -64,6 +64,17 @@ void warn_of_redone_touches(const std::vector<Map>& maps, const Map& result) {
                  listed(ids, {}, 5));
 }
 
+/// The settings of two runs may be the same where the recording's own files were mended in between.
+void warn_of_different_readings(const std::vector<Map>& maps) {
+  for (size_t i = 0; i < maps.size(); ++i)
+    for (size_t j = 0; j < i; ++j)
+      if (const std::vector<std::string> names = differences_in_reading(maps[j], maps[i]); !names.empty())
+        spdlog::warn(
+            "maps {} and {} are of one recording that was understood in two ways ({}): what is added up was not "
+            "measured alike",
+            j + 1, i + 1, listed(names));
+}
+
 /// Where the result is not what one run over all frames would give.
 void warn_of_what_does_not_add(const std::vector<Map>& maps, const MergeOptions& merging) {
   if (maps.size() < 2) return;
@@ -76,6 +87,7 @@ void warn_of_what_does_not_add(const std::vector<Map>& maps, const MergeOptions&
       different.push_back(std::string(key) + ": " + *values.begin() + " and " + *values.rbegin());
   if (!different.empty())
     spdlog::warn("maps fused with different settings ({}): what is added up was not measured alike", listed(different));
+  warn_of_different_readings(maps);
   const auto any_above_zero = [&](const char* key) {
     const std::set<double> numbers = numbers_of_runs(maps, key);
     return !numbers.empty() && *numbers.rbegin() > 0;

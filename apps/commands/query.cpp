@@ -40,30 +40,6 @@ json instance_json(const Block& block, int offset) {
   return {{"id", block.instance->id[offset]}, {"votes", block.instance->votes[offset]}};
 }
 
-/// Trilinear between the voxel centres about a point, of which those that do not count there need not be observed;
-/// nothing where another one was not.
-std::optional<double> interpolated_distance(const Map& map, const Eigen::Vector3d& point) {
-  constexpr double kCounts = 1e-4;  // share of a corner; a point on a mesh is off its edge by the rounding of floats
-  const Eigen::Vector3d at = point / map.voxel_size_m, base = at.array().floor();
-  double sum = 0, total = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    double share = 1;
-    Eigen::Vector3i offset;
-    for (int axis = 0; axis < 3; ++axis) {
-      offset[axis] = corner >> axis & 1;
-      share *= offset[axis] == 1 ? at[axis] - base[axis] : 1 - (at[axis] - base[axis]);
-    }
-    if (share < kCounts) continue;
-    const Eigen::Vector3i voxel = base.cast<int>() + offset;
-    const Index3 index{voxel.x(), voxel.y(), voxel.z()};
-    const Block* block = map.store.get(block_of_voxel(index));
-    if (block == nullptr || !(block->geometry->weight[offset_in_block(index)] > 0)) return std::nullopt;
-    sum += share * double(block->geometry->tsdf[offset_in_block(index)]);
-    total += share;
-  }
-  return sum / total;
-}
-
 /// What is known of a point without beliefs; `voxel`: the observed voxel whose belief is to be added, if there is one.
 json geometry_json(const Map& map, const Eigen::Vector3d& point, bool instances, std::optional<Index3>& voxel) {
   json out;
@@ -83,7 +59,7 @@ json geometry_json(const Map& map, const Eigen::Vector3d& point, bool instances,
     out["reason"] = "never observed";
     return out;
   }
-  const std::optional<double> between = interpolated_distance(map, point);
+  const std::optional<double> between = sample_tsdf(map, point);
   out["signed_distance_m"] = between.value_or(double(block->geometry->tsdf[offset_in_block(at)]));
   out["interpolated"] = between.has_value();
   if (instances) out["instance"] = instance_json(*block, offset_in_block(at));

@@ -159,6 +159,20 @@ std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vec
   return save_map(map, path, {.views = complete || !record.stopped.empty()});
 }
 
+std::vector<std::string> differences_in_reading(const Map& a, const Map& b) {
+  json progress[2];
+  for (const Map* map : {&a, &b})
+    if (const auto text = map->metadata.find(kProgress); text != map->metadata.end())
+      progress[map == &b] = json::parse(text->second, nullptr, false);
+  std::vector<std::string> names;
+  if (!progress[0].is_object() || !progress[1].is_object()) return names;
+  if (progress[0].value("recording", json()) != progress[1].value("recording", json())) return names;
+  const json here = progress[0].value("reading", json::object()), there = progress[1].value("reading", json::object());
+  for (const auto& [name, value] : here.items())
+    if (there.contains(name) && there[name] != value) names.push_back(name);
+  return names;
+}
+
 void forget_progress(Map& map) { map.metadata.erase(kProgress); }
 
 std::optional<Checkpoint> resume(const std::filesystem::path& path, const SequenceInfo& sequence,

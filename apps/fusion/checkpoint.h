@@ -28,6 +28,10 @@ std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vec
                             bool complete, const std::string& touches, const SequenceInfo& sequence,
                             const nlohmann::ordered_json& config, const std::filesystem::path& path);
 
+/// What differs in how two maps' runs understood the same recording (camera, depth scale, label images, ...), by name;
+/// empty where it is not the same recording, or not known of one of them.
+std::vector<std::string> differences_in_reading(const Map& a, const Map& b);
+
 /// Of a part of a map: no run can go on with it.
 void forget_progress(Map& map);
 

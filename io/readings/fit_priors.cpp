@@ -64,12 +64,13 @@ namespace {
 
 /// Fits in the order of the classes; those of one group take the correlation of the others.
 std::vector<std::optional<PriorFit>> fits_of(const std::vector<ClassReadings>& classes, double max_nu_0) {
-  std::vector<PriorFit> alone;
-  for (const ClassReadings& c : classes)
-    if (const std::optional<PriorFit> fit = fit_prior(c.groups, max_nu_0)) alone.push_back(*fit);
-  const std::optional<double> rho = pooled_rho(alone);
   std::vector<std::optional<PriorFit>> fits;
-  for (const ClassReadings& c : classes) fits.push_back(fit_prior(c.groups, max_nu_0, rho));
+  std::vector<PriorFit> found;
+  for (const ClassReadings& c : classes)
+    if (fits.push_back(fit_prior(c.groups, max_nu_0)); fits.back()) found.push_back(*fits.back());
+  if (const std::optional<double> rho = pooled_rho(found))
+    for (size_t i = 0; i < classes.size(); ++i)
+      if (fits[i] && !fits[i]->rho) fits[i] = fit_prior(classes[i].groups, max_nu_0, rho);
   return fits;
 }
 

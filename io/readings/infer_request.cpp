@@ -153,6 +153,10 @@ void expect_length(const std::string& field, size_t found, size_t expected, cons
   }
 }
 
+const char* concentrations_name(const json& prior) {
+  return prior.contains("alpha") && !prior.contains("a") ? "alpha" : "a";
+}
+
 void parse_prior(const json& prior, InferRequest& request) {
   if (!prior.is_object()) fail("prior", "an object", shown(prior));
   static const char* const kNames[] = {"tau", "kappa", "beta", "gamma"};
@@ -171,7 +175,7 @@ void parse_prior(const json& prior, InferRequest& request) {
     request.prior[c] = {real(lists[0][c], field(0)), positive(lists[1][c], field(1)), positive(lists[2][c], field(2)),
                         positive(lists[3][c], field(3))};
   }
-  const std::string name = prior.contains("a") || !prior.contains("alpha") ? "a" : "alpha";
+  const std::string name = concentrations_name(prior);
   if (prior.contains(name)) {
     request.a = numbers(prior[name], "prior." + name, positive);
     expect_length("prior." + name, request.a.size(), k, "prior.tau");
@@ -215,7 +219,7 @@ void parse_readings(const json& document, InferRequest& request) {
 
 /// Of a Dirichlet that is to be projected.
 void check_concentrations(const json& prior, std::span<const double> a) {
-  const std::string name = prior.contains("a") ? "a" : "alpha";
+  const std::string name = concentrations_name(prior);
   for (size_t c = 0; c < a.size(); ++c)
     if (!(a[c] >= kLeastConcentration && a[c] <= kMostConcentration))
       fail(element("prior." + name, prior[name], c), "a number from 1e-15 to 1e15", shown(json(a[c])));

@@ -1,19 +1,17 @@
-// Nothing that a map holds is lost to a name, a neighbour or a changed input.
+// Nothing that a map holds is lost to a name, a neighbour or another command.
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <filesystem>
-#include <fstream>
 #include <future>
-#include <nlohmann/json.hpp>
-#include <set>
 
 #include "io/files/file_lock.h"
 #include "io/images/image_encode.h"
 #include "io/map_file/map_file.h"
 #include "mapping/touch/touch_update.h"
 #include "tests/cli/command.h"
+#include "tests/cli/recording.h"
 #include "tests/cli/sequences.h"
 #include "tests/support/data.h"
 #include "tests/support/random_map.h"
@@ -21,38 +19,8 @@
 #include "tests/support/waiting.h"
 
 namespace felt::test {
-namespace {
 namespace fs = std::filesystem;
 using Catch::Matchers::Contains;
-using nlohmann::json;
-
-/// A recording of a wall with classes and a property, and where its map goes.
-struct Recording {
-  TemporaryDirectory folder;
-  fs::path sequence = folder.path() / "recording", out = folder.path() / "result", map = out / "map.vdb";
-  explicit Recording(int frames = 4) {
-    write_generic(sequence, frames);
-    write_text(sequence / "properties.yaml",
-               "friction: {priors: {wall: {mean: 0.3, sd: 0.05}, floor: {mean: 0.5, sd: 0.05}}}\n");
-  }
-  CommandResult reconstruct(const std::string& options = "") const {
-    return run_feltmap("reconstruct " + quoted(sequence) + " --out " + quoted(out) + " --voxel-size 0.05 --quiet " +
-                       options);
-  }
-  std::string touch(const std::string& value = "0.4", const fs::path& of = {}) const {
-    return "touch " + quoted(of.empty() ? map : of) + " --sequence " + quoted(sequence) +
-           " --frame 0 --pixel 12,8 --region sphere " + "--radius 0.3 --property friction --value " + value;
-  }
-};
-
-void refused(const std::string& arguments, int code, const std::string& reason) {
-  const CommandResult result = run_feltmap(arguments);
-  INFO(arguments << "\n" << result.err);
-  CHECK(result.exit_code == code);
-  CHECK_THAT(result.err, Contains(reason));
-}
-
-}  // namespace
 
 TEST_CASE("files of people beside a map stay, also those that are called parts") {
   const Recording recording;
@@ -65,83 +33,6 @@ TEST_CASE("files of people beside a map stay, also those that are called parts")
   for (const char* name : {"map.part-1.vdb", "map.part-kitchen.vdb", "map.part-1-b.vdb"})
     CHECK(file_text(recording.out / name) == "mine");
   CHECK_FALSE(fs::exists(recording.out / "map.part-7-1.vdb"));
-}
-
-TEST_CASE("a run goes on only with the tables and contents that it began with") {
-  const Recording recording;
-  const fs::path confusion = recording.folder.path() / "confusion.csv";
-  write_text(confusion, "x,wall,floor,sofa\nwall,0.8,0.1,0.1\nfloor,0.1,0.8,0.1\nsofa,0.1,0.1,0.8\n");
-  const std::string options = "--confusion " + quoted(confusion);
-  REQUIRE(recording.reconstruct(options).exit_code == 0);
-  const std::string hash = map_hash(load_map(recording.map));
-  REQUIRE(recording.reconstruct(options + " --resume").exit_code == 0);
-  CHECK(map_hash(load_map(recording.map)) == hash);
-  const auto changed = [&](const fs::path& file, const std::string& from, const std::string& to) {
-    const std::string before = file_text(file);
-    std::string text = before;
-    text.replace(text.find(from), from.size(), to);
-    write_text(file, text);
-    const CommandResult result = recording.reconstruct(options + " --resume");
-    write_text(file, before);
-    CHECK(result.exit_code == 3);
-    return result.err;
-  };
-  CHECK_THAT(changed(recording.sequence / "classes.yaml", "sofa", "chair"), Contains("sofa"));  // the confusion's
-  CHECK_THAT(changed(recording.sequence / "classes.yaml", "name: floor", "name: floor, ignore: true"),
-             Contains("class table"));
-  CHECK_THAT(changed(recording.sequence / "properties.yaml", "0.3", "0.35"), Contains("property table"));
-  CHECK_THAT(changed(confusion, "wall,0.8,0.1", "wall,0.7,0.2"), Contains("confusion_content"));
-  CHECK(map_hash(load_map(recording.map)) == hash);
-}
-
-TEST_CASE("a run goes on although its files are named in another way") {
-  const Recording recording;
-  const fs::path folder = recording.folder.path(), labels = folder / "labels";
-  fs::rename(recording.sequence / "labels", labels);
-  fs::rename(recording.sequence / "classes.yaml", folder / "classes.yaml");
-  write_text(folder / "confusion.csv", "x,wall,floor,sofa\nwall,0.8,0.1,0.1\nfloor,0.1,0.8,0.1\nsofa,0.1,0.1,0.8\n");
-  const auto options = [](const std::string& root) {
-    return "--labels " + root + "labels --classes " + root + "classes.yaml --confusion " + root + "confusion.csv";
-  };
-  REQUIRE(recording.reconstruct(options(folder.string() + "/")).exit_code == 0);
-  const CommandResult resumed = recording.reconstruct(options(folder.string() + "/result/../") + " --resume");
-  INFO(resumed.err);
-  CHECK(resumed.exit_code == 0);
-  fs::rename(labels, folder / "others");
-  std::string elsewhere = options(folder.string() + "/");
-  elsewhere.replace(elsewhere.find("labels --classes"), 6, "others/");
-  CHECK(recording.reconstruct(elsewhere + " --resume").exit_code == 0);
-  write_bytes(folder / "others" / "2.png", encode_png(Image<uint16_t>(24, 16, 1)));
-  const CommandResult others = recording.reconstruct(elsewhere + " --resume");
-  CHECK(others.exit_code == 3);
-  CHECK_THAT(others.err, Contains("label images: expected those that") && Contains("found others"));
-}
-
-TEST_CASE("a run does not go on when its recording is understood in another way, or has other labels") {
-  const Recording recording;
-  REQUIRE(recording.reconstruct().exit_code == 0);
-  const std::string before = file_text(recording.map);
-  const fs::path yaml = recording.sequence / "sequence.yaml";
-  const std::string as_recorded = file_text(yaml);
-  const auto refused_with = [&](const std::string& text, const std::string& reason) {
-    write_text(yaml, text);
-    const CommandResult result = recording.reconstruct("--resume");
-    INFO(result.err);
-    CHECK(result.exit_code == 3);
-    CHECK_THAT(result.err, Contains("--resume: the recording's " + reason));
-  };
-  const std::string scaled = "camera: {fx: 20, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16}\ndepth_scale: 2500\n";
-  refused_with(scaled, "depth scale: expected \"2000.0\" as in");
-  refused_with("camera: {fx: 21, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16}\ndepth_scale: 2000\n", "camera");
-  refused_with(as_recorded + "depth_is_ray_length: true\n", "depth along rays");
-  refused_with(as_recorded + "pose_convention: opengl\n", "pose convention");
-  write_text(yaml, as_recorded);
-  CHECK(recording.reconstruct("--resume").exit_code == 0);
-  fs::remove_all(recording.sequence / "labels");
-  const CommandResult unlabelled = recording.reconstruct("--resume");
-  CHECK(unlabelled.exit_code == 3);
-  CHECK_THAT(unlabelled.err, Contains("label images"));
-  CHECK(file_text(recording.map) == before);
 }
 
 TEST_CASE("a map that is named by a link is as safe as by its own name") {
@@ -167,22 +58,6 @@ TEST_CASE("a map that is named by a link is as safe as by its own name") {
   CHECK(load_map(recording.out / "later.vdb").touches.touches.size() == 1);
 }
 
-TEST_CASE("merging says which touches count again that one of the maps took back") {
-  const Recording recording;
-  REQUIRE(recording.reconstruct().exit_code == 0);
-  REQUIRE(run_feltmap(recording.touch()).exit_code == 0);
-  const fs::path undone = recording.out / "undone.vdb", both = recording.out / "both.vdb";
-  const std::string id = id_text(load_map(recording.map).touches.touches.front().id);
-  REQUIRE(run_feltmap("touch " + quoted(recording.map) + " --undo " + id + " --out " + quoted(undone)).exit_code == 0);
-  const CommandResult merged = run_feltmap("merge " + quoted(recording.map) + " " + quoted(undone) + " --out " +
-                                           quoted(both) + " --allow-shared-frames");
-  INFO(merged.err);
-  REQUIRE(merged.exit_code == 0);
-  CHECK_THAT(merged.err, Contains("undone in one of the maps") && Contains(id));
-  CHECK_FALSE(load_map(both).touches.touches.front().undone);
-  refused("merge " + quoted(recording.map) + " --max-weight 0.5 --out " + quoted(both) + " --force", 2, "--max-weight");
-}
-
 TEST_CASE("a touch by the frame of another recording is said to be one") {
   const Recording recording, other(9);
   REQUIRE(recording.reconstruct().exit_code == 0);
@@ -198,24 +73,6 @@ TEST_CASE("a touch by the frame of another recording is said to be one") {
   INFO(there.err);
   CHECK(there.exit_code == 0);
   CHECK_THAT(there.err, Contains("was made of other recordings"));
-}
-
-TEST_CASE("touches that come after a complete run are said not to be applied") {
-  const Recording recording;
-  REQUIRE(recording.reconstruct().exit_code == 0);
-  write_text(recording.sequence / "touches.csv", "frame,u,v,property,value\n0,12,8,friction,0.4\n");
-  const CommandResult result = recording.reconstruct("--resume");
-  CHECK(result.exit_code == 0);
-  CHECK_THAT(result.err, Contains("touches.csv") && Contains("not applied"));
-  // And where the run had a file of touches, those that were added.
-  REQUIRE(recording.reconstruct("--force").exit_code == 0);
-  CHECK_THAT(recording.reconstruct("--resume").err, !Contains("not applied"));
-  write_text(recording.sequence / "touches.csv",
-             "frame,u,v,property,value\n0,12,8,friction,0.4\n1,12,8,friction,0.41\n");
-  const CommandResult grown = recording.reconstruct("--resume");
-  CHECK(grown.exit_code == 0);
-  CHECK_THAT(grown.err, Contains("touches.csv: has changed") && Contains("not applied"));
-  CHECK(load_map(recording.map).touches.touches.size() == 1);
 }
 
 TEST_CASE("commands that change one map wait for each other, and none writes into a folder at work") {
@@ -377,36 +234,6 @@ TEST_CASE("a run does not replace what came into its folder while it waited for 
   CHECK(file_text(recording.map) == "mine");
 }
 
-TEST_CASE("a part of a map is not merged with the whole, and no run goes on with it") {
-  const Recording recording;
-  REQUIRE(recording.reconstruct().exit_code == 0);
-  const fs::path part = recording.folder.path() / "part" / "map.vdb";
-  fs::create_directories(part.parent_path());
-  REQUIRE(
-      run_feltmap("export " + quoted(recording.map) + " --vdb " + quoted(part) + " --box -1,-1,0,0.2,1,3").exit_code ==
-      0);
-  refused("merge " + quoted(recording.map) + " " + quoted(part) + " --out " + quoted(recording.folder.path() / "m.vdb"),
-          3, "shared");
-  refused(
-      "reconstruct " + quoted(recording.sequence) + " --voxel-size 0.05 --resume --out " + quoted(part.parent_path()),
-      4, "continued");
-}
-
-TEST_CASE("no run goes on with a merged map, of one map or of equal ones") {
-  const Recording recording;
-  REQUIRE(recording.reconstruct().exit_code == 0);
-  const fs::path copy = recording.folder.path() / "copy.vdb", merged = recording.folder.path() / "merged" / "map.vdb";
-  fs::copy_file(recording.map, copy);
-  fs::create_directory(merged.parent_path());
-  for (const std::string& maps :
-       {quoted(copy), quoted(copy) + " " + quoted(recording.map) + " --allow-shared-frames"}) {
-    REQUIRE(run_feltmap("merge --force " + maps + " --out " + quoted(merged)).exit_code == 0);
-    refused("reconstruct " + quoted(recording.sequence) + " --voxel-size 0.05 --resume --out " +
-                quoted(merged.parent_path()),
-            4, "none: a merged map");
-  }
-}
-
 TEST_CASE("maps whose properties or votes differ are no equal maps") {
   const TemporaryDirectory folder;
   const std::string a = (folder.path() / "a.vdb").string(), b = (folder.path() / "b.vdb").string();
@@ -434,85 +261,6 @@ TEST_CASE("maps whose properties or votes differ are no equal maps") {
       for (int v = 0; v < kBlockVoxels; ++v) planes->id[v] = uint16_t(planes->id[v] != 0 ? planes->id[v] + 1 : 0);
   save_map(map, b);
   CHECK(run_feltmap("diff --tol 1000 " + a + " " + b).exit_code == 1);
-}
-
-TEST_CASE("a run that can fuse nothing leaves the map that lies there, checkpoints or not") {
-  const Recording recording;
-  REQUIRE(recording.reconstruct().exit_code == 0);
-  const std::string before = file_text(recording.map);
-  std::string poses;
-  for (int i = 0; i < 4; ++i) poses += std::to_string(i) + " nan 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n";
-  write_text(recording.sequence / "poses.txt", poses);
-  CHECK(recording.reconstruct("--force --checkpoint 1").exit_code == 4);
-  CHECK(file_text(recording.map) == before);
-}
-
-TEST_CASE("merging keeps the cap of weights that the maps were made with") {
-  const Recording recording(8);
-  REQUIRE(recording.reconstruct("--max-weight 3").exit_code == 0);
-  const fs::path copy = recording.folder.path() / "copy.vdb";
-  REQUIRE(run_feltmap("merge " + quoted(recording.map) + " --out " + quoted(copy)).exit_code == 0);
-  CHECK(map_hash(load_map(copy)) == map_hash(load_map(recording.map)));
-  const std::string twice = "merge " + quoted(recording.map) + " " + quoted(copy) + " --allow-shared-frames --out " +
-                            quoted(recording.folder.path() / "twice.vdb");
-  REQUIRE(run_feltmap(twice).exit_code == 0);
-  float most = 0;
-  const Map merged = load_map(recording.folder.path() / "twice.vdb");
-  for (const Block& block : merged.store.blocks())
-    most = std::max(most, *std::max_element(block.geometry->weight, block.geometry->weight + kBlockVoxels));
-  CHECK(most == 3);
-  const Recording other(2);
-  REQUIRE(other.reconstruct("--max-weight 200").exit_code == 0);
-  const std::string both = "merge " + quoted(recording.map) + " " + quoted(other.map) +
-                           " --allow-shared-frames --out " + quoted(recording.folder.path() / "both.vdb");
-  refused(both, 3, "--max-weight");
-  CHECK(run_feltmap(both + " --max-weight 200").exit_code == 0);
-}
-
-TEST_CASE("merging warns where class evidence depends on the viewpoints of one run") {
-  const Recording recording(6);
-  const auto part = [&](const char* frames, const char* name, const std::string& options) {
-    REQUIRE(recording.reconstruct(options + " --force --frames " + frames).exit_code == 0);
-    const fs::path map = recording.folder.path() / name;
-    fs::copy_file(recording.map, map, fs::copy_options::overwrite_existing);
-    return quoted(map) + " ";
-  };
-  const auto warnings = [&](const std::string& options) {
-    const std::string maps = part("0:3", "a.vdb", options) + part("3:6", "b.vdb", options);
-    const CommandResult result =
-        run_feltmap("merge " + maps + "--force --out " + quoted(recording.folder.path() / "merged.vdb"));
-    CHECK(result.exit_code == 0);
-    return result.err;
-  };
-  CHECK_THAT(warnings(""), !Contains("--label-novelty"));
-  CHECK_THAT(warnings("--label-novelty 1"), Contains("--label-novelty"));
-}
-
-TEST_CASE("merging merged maps keeps every configuration") {
-  const TemporaryDirectory folder;
-  std::vector<std::string> maps;
-  for (int i = 0; i < 4; ++i) {
-    Map map = random_map({.seed = 1, .blocks = 2});
-    map.frames = {};
-    record_frame(map.frames, "recording " + std::to_string(i), "", 0);
-    map.metadata = {{"config", "{\"day\": " + std::to_string(i) + "}"}};
-    maps.push_back((folder.path() / (std::to_string(i) + ".vdb")).string());
-    save_map(map, maps.back());
-  }
-  const std::string two = (folder.path() / "two.vdb").string(), all = (folder.path() / "all.vdb").string();
-  REQUIRE(run_feltmap("merge " + maps[0] + " " + maps[1] + " --out " + two).exit_code == 0);
-  REQUIRE(run_feltmap("merge " + two + " " + maps[2] + " " + maps[3] + " --out " + all).exit_code == 0);
-  std::set<std::string> texts;
-  for (const auto& [key, text] : load_map(all).metadata) texts.insert(text);
-  CHECK(texts.size() == 4);
-}
-
-TEST_CASE("settings are stored with every digit, and a run does not go on with almost the same ones") {
-  const Recording recording;
-  REQUIRE(recording.reconstruct("--label-evidence 0.3333333").exit_code == 0);
-  CHECK(json::parse(load_map(recording.map).metadata.at("config")).at("label_evidence") == 0.3333333);
-  CHECK(recording.reconstruct("--label-evidence 0.333333 --resume").exit_code == 3);
-  CHECK(recording.reconstruct("--label-evidence 0.3333333 --resume").exit_code == 0);
 }
 
 TEST_CASE("what cannot be printed is an error, and a pipe is no map") {
