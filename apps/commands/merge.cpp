@@ -66,13 +66,18 @@ void warn_of_redone_touches(const std::vector<Map>& maps, const Map& result) {
 
 /// The settings of two runs may be the same where the recording's own files were mended in between.
 void warn_of_different_readings(const std::vector<Map>& maps) {
+  std::vector<RecordingAsRead> recordings;
+  for (const Map& map : maps) recordings.push_back(recording_of(map));
   for (size_t i = 0; i < maps.size(); ++i)
-    for (size_t j = 0; j < i; ++j)
-      if (const std::vector<std::string> names = differences_in_reading(maps[j], maps[i]); !names.empty())
+    for (size_t j = 0; j < i; ++j) {
+      if (recordings[j].content != recordings[i].content) continue;
+      if (const std::vector<std::string> names = differences(recordings[j].reading, recordings[i].reading);
+          !names.empty())
         spdlog::warn(
             "maps {} and {} are of one recording that was understood in two ways ({}): what is added up was not "
             "measured alike",
             j + 1, i + 1, listed(names));
+    }
 }
 
 /// Where the result is not what one run over all frames would give.

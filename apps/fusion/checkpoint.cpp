@@ -58,14 +58,19 @@ json progress_of(const FusionRecord& record, const std::vector<Eigen::Isometry3d
           {"viewpoints", poses_json(viewpoints)}};
 }
 
-json text_of(const Map& map, const char* key, const std::string& where) {
+/// No object where the map has no such text, or one that is none.
+json text_of(const Map& map, const char* key) {
   const auto found = map.metadata.find(key);
-  const json text = found == map.metadata.end() ? json() : json::parse(found->second, nullptr, false);
+  return found == map.metadata.end() ? json() : json::parse(found->second, nullptr, false);
+}
+
+json required_text_of(const Map& map, const char* key, const std::string& where) {
+  const json text = text_of(map, key);
   if (text.is_object()) return text;
   std::string instead = "something else";
   if (map.metadata.contains(std::string(key) + " 1"))  // as merge numbers them
     instead = "those of several runs: a merged map cannot be continued";
-  else if (found == map.metadata.end())
+  else if (!map.metadata.contains(key))
     instead = "none: a merged map, a part of one, or another map that cannot be continued";
   throw FormatError(
       describe_mismatch(where, std::string("text '") + key + "'", "that of a map of reconstruct", instead));
@@ -92,8 +97,20 @@ void read_progress(const json& progress, const std::string& where, Checkpoint& c
   }
 }
 
-void require_same_recording(const json& progress, const Map& map, const SequenceInfo& now, const std::string& where) {
-  if (progress.value("recording", json()) == now.content) return;
+/// Empty where the progress does not say, as that of maps of earlier versions.
+RecordingAsRead recording_of(const json& progress) {
+  RecordingAsRead recording;
+  if (const auto content = progress.find("recording"); content != progress.end() && content->is_string())
+    recording.content = *content;
+  const json reading = progress.value("reading", json::object());
+  for (const auto& [name, text] : reading.items())
+    if (text.is_string()) recording.reading[name] = text;
+  return recording;
+}
+
+void require_same_recording(const RecordingAsRead& then, const Map& map, const SequenceInfo& now,
+                            const std::string& where) {
+  if (then.content == now.content) return;
   const bool same_beginning = !map.frames.runs.empty() && map.frames.runs.back().sequence == now.fingerprint;
   throw ConfigError(describe_mismatch(
       "--resume", "recording", "the one that " + where + " was made of",
@@ -103,16 +120,14 @@ void require_same_recording(const json& progress, const Map& map, const Sequence
 }
 
 /// What the recording itself says may be mended between two runs: a scale, a camera, labels.
-void require_same_reading(const json& progress, const SequenceInfo& now, const std::string& where) {
+void require_same_reading(const RecordingAsRead& then, const SequenceInfo& now, const std::string& where) {
   Problems problems;
-  const json then = progress.value("reading", json::object());
-  for (const auto& [name, is] : now.reading) {
-    if (!then.contains(name) || then[name] == is) continue;
-    const std::string was = json_text(then[name]);
+  for (const std::string& name : differences(then.reading, now.reading)) {
+    const std::string was = json_text(json(then.reading.at(name))), is = json_text(json(now.reading.at(name)));
     const bool images = name == "label images";
     problems.add(describe_mismatch("--resume", "the recording's " + name,
                                    images ? "those that " + where + " was made of" : was + " as in " + where,
-                                   images ? "others" : json_text(json(is))));
+                                   images ? "others" : is));
   }
   problems.throw_if_any();
 }
@@ -159,17 +174,15 @@ std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vec
   return save_map(map, path, {.views = complete || !record.stopped.empty()});
 }
 
-std::vector<std::string> differences_in_reading(const Map& a, const Map& b) {
-  json progress[2];
-  for (const Map* map : {&a, &b})
-    if (const auto text = map->metadata.find(kProgress); text != map->metadata.end())
-      progress[map == &b] = json::parse(text->second, nullptr, false);
+RecordingAsRead recording_of(const Map& map) {
+  const json progress = text_of(map, kProgress);
+  return progress.is_object() ? recording_of(progress) : RecordingAsRead();
+}
+
+std::vector<std::string> differences(const Reading& a, const Reading& b) {
   std::vector<std::string> names;
-  if (!progress[0].is_object() || !progress[1].is_object()) return names;
-  if (progress[0].value("recording", json()) != progress[1].value("recording", json())) return names;
-  const json here = progress[0].value("reading", json::object()), there = progress[1].value("reading", json::object());
-  for (const auto& [name, value] : here.items())
-    if (there.contains(name) && there[name] != value) names.push_back(name);
+  for (const auto& [name, text] : a)
+    if (const auto other = b.find(name); other != b.end() && other->second != text) names.push_back(name);
   return names;
 }
 
@@ -180,10 +193,11 @@ std::optional<Checkpoint> resume(const std::filesystem::path& path, const Sequen
   if (!std::filesystem::exists(path)) return std::nullopt;
   Map map = load_map(path);
   const std::string where = path.string();
-  const json progress = text_of(map, kProgress, where);
-  require_same_recording(progress, map, sequence, where);
-  require_same_run(text_of(map, kConfig, where), json::parse(json_text(config)), where);
-  require_same_reading(progress, sequence, where);
+  const json progress = required_text_of(map, kProgress, where);
+  const RecordingAsRead recording = recording_of(progress);
+  require_same_recording(recording, map, sequence, where);
+  require_same_run(required_text_of(map, kConfig, where), json::parse(json_text(config)), where);
+  require_same_reading(recording, sequence, where);
   Checkpoint checkpoint{std::move(map), {}, {}, false, {}};
   read_progress(progress, where, checkpoint);
   return checkpoint;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -28,9 +29,18 @@ std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vec
                             bool complete, const std::string& touches, const SequenceInfo& sequence,
                             const nlohmann::ordered_json& config, const std::filesystem::path& path);
 
-/// What differs in how two maps' runs understood the same recording (camera, depth scale, label images, ...), by name;
-/// empty where it is not the same recording, or not known of one of them.
-std::vector<std::string> differences_in_reading(const Map& a, const Map& b);
+using Reading = std::map<std::string, std::string>;  ///< SequenceInfo::reading
+
+/// The recording of a map's run, and how it was understood then.
+struct RecordingAsRead {
+  std::string content;  ///< SequenceInfo::content; empty where that is not known, as of merged maps
+  Reading reading;
+};
+
+RecordingAsRead recording_of(const Map& map);
+
+/// Names of what both readings say, and say differently: camera, depth scale, label images, ...
+std::vector<std::string> differences(const Reading& a, const Reading& b);
 
 /// Of a part of a map: no run can go on with it.
 void forget_progress(Map& map);

@@ -66,8 +66,10 @@ namespace {
 std::vector<std::optional<PriorFit>> fits_of(const std::vector<ClassReadings>& classes, double max_nu_0) {
   std::vector<std::optional<PriorFit>> fits;
   std::vector<PriorFit> found;
-  for (const ClassReadings& c : classes)
-    if (fits.push_back(fit_prior(c.groups, max_nu_0)); fits.back()) found.push_back(*fits.back());
+  for (const ClassReadings& c : classes) {
+    fits.push_back(fit_prior(c.groups, max_nu_0));
+    if (fits.back()) found.push_back(*fits.back());
+  }
   if (const std::optional<double> rho = pooled_rho(found))
     for (size_t i = 0; i < classes.size(); ++i)
       if (fits[i] && !fits[i]->rho) fits[i] = fit_prior(classes[i].groups, max_nu_0, rho);

@@ -153,6 +153,7 @@ void expect_length(const std::string& field, size_t found, size_t expected, cons
   }
 }
 
+/// Of the two names that the concentrations may have.
 const char* concentrations_name(const json& prior) {
   return prior.contains("alpha") && !prior.contains("a") ? "alpha" : "a";
 }

@@ -13,6 +13,26 @@
 namespace felt::test {
 namespace fs = std::filesystem;
 using Catch::Matchers::Contains;
+namespace {
+
+/// Makes a map of some of the frames and returns its quoted path and a space.
+std::string part(const Recording& recording, const std::string& frames, const char* name,
+                 const std::string& options = "") {
+  REQUIRE(recording.reconstruct(options + " --force --frames " + frames).exit_code == 0);
+  const fs::path map = recording.folder.path() / name;
+  fs::copy_file(recording.map, map, fs::copy_options::overwrite_existing);
+  return quoted(map) + " ";
+}
+
+std::string warnings_of_merge(const Recording& recording, const std::string& maps) {
+  const CommandResult result =
+      run_feltmap("merge " + maps + "--force --out " + quoted(recording.folder.path() / "merged.vdb"));
+  INFO(result.err);
+  CHECK(result.exit_code == 0);
+  return result.err;
+}
+
+}  // namespace
 
 TEST_CASE("merging says which touches count again that one of the maps took back") {
   const Recording recording;
@@ -69,40 +89,19 @@ TEST_CASE("merging keeps the cap of weights that the maps were made with") {
 
 TEST_CASE("merging says that a recording was understood in two ways") {
   const Recording recording;
-  const auto part = [&](const char* frames, const char* name) {
-    REQUIRE(recording.reconstruct(std::string("--force --frames ") + frames).exit_code == 0);
-    fs::copy_file(recording.map, recording.folder.path() / name);
-    return quoted(recording.folder.path() / name) + " ";
-  };
-  const auto warnings = [&](const std::string& maps) {
-    const CommandResult result =
-        run_feltmap("merge " + maps + "--force --out " + quoted(recording.folder.path() / "merged.vdb"));
-    INFO(result.err);
-    CHECK(result.exit_code == 0);
-    return result.err;
-  };
-  const std::string first = part("0:2", "first.vdb");
-  CHECK_THAT(warnings(first + part("2:4", "second.vdb")), !Contains("understood"));
+  const std::string first = part(recording, "0:2", "first.vdb");
+  CHECK_THAT(warnings_of_merge(recording, first + part(recording, "2:4", "second.vdb")), !Contains("understood"));
   write_text(recording.sequence / "sequence.yaml",
              "camera: {fx: 20, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16}\ndepth_scale: 2500\n");
-  CHECK_THAT(warnings(first + part("2:4", "scaled.vdb")),
+  CHECK_THAT(warnings_of_merge(recording, first + part(recording, "2:4", "scaled.vdb")),
              Contains("maps 1 and 2 are of one recording that was understood in two ways (depth scale)"));
 }
 
 TEST_CASE("merging warns where class evidence depends on the viewpoints of one run") {
   const Recording recording(6);
-  const auto part = [&](const char* frames, const char* name, const std::string& options) {
-    REQUIRE(recording.reconstruct(options + " --force --frames " + frames).exit_code == 0);
-    const fs::path map = recording.folder.path() / name;
-    fs::copy_file(recording.map, map, fs::copy_options::overwrite_existing);
-    return quoted(map) + " ";
-  };
   const auto warnings = [&](const std::string& options) {
-    const std::string maps = part("0:3", "a.vdb", options) + part("3:6", "b.vdb", options);
-    const CommandResult result =
-        run_feltmap("merge " + maps + "--force --out " + quoted(recording.folder.path() / "merged.vdb"));
-    CHECK(result.exit_code == 0);
-    return result.err;
+    return warnings_of_merge(recording,
+                             part(recording, "0:3", "a.vdb", options) + part(recording, "3:6", "b.vdb", options));
   };
   CHECK_THAT(warnings(""), !Contains("--label-novelty"));
   CHECK_THAT(warnings("--label-novelty 1"), Contains("--label-novelty"));

@@ -20,7 +20,7 @@ CommandResult Recording::reconstruct(const std::string& options) const {
 
 std::string Recording::touch(const std::string& value, const std::filesystem::path& of) const {
   return "touch " + quoted(of.empty() ? map : of) + " --sequence " + quoted(sequence) +
-         " --frame 0 --pixel 12,8 --region sphere " + "--radius 0.3 --property friction --value " + value;
+         " --frame 0 --pixel 12,8 --region sphere --radius 0.3 --property friction --value " + value;
 }
 
 void refused(const std::string& arguments, int code, const std::string& reason) {
