@@ -116,6 +116,7 @@ void require_no_files(const fs::path& folder, const std::vector<std::string>& na
 void require_no_file(const fs::path& file, bool overwrite) {
   if (!overwrite && fs::exists(file))
     throw IoError(describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", "one"));
+  remove_abandoned_parts(linked_file(file));
 }
 
 void require_writable(const fs::path& file, bool overwrite) {

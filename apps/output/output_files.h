@@ -19,7 +19,7 @@ void prepare_output_folder(const std::filesystem::path& folder);
 /// write there while one waits for the lock.
 void require_no_files(const std::filesystem::path& folder, const std::vector<std::string>& names, bool overwrite);
 
-/// The same for one file: throws IoError where it exists unless `overwrite`.
+/// The same for one file: throws IoError where it exists unless `overwrite`, and removes half-written ones.
 void require_no_file(const std::filesystem::path& file, bool overwrite);
 
 /// Throws IoError where the file was made read-only, unless `overwrite`: files are replaced by renaming, which would

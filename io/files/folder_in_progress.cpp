@@ -1,7 +1,11 @@
 #include "io/files/folder_in_progress.h"
 
+#include <fcntl.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <sys/file.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -21,6 +25,34 @@ std::optional<dev_t> device_of(const fs::path& path) {
   return status.st_dev;
 }
 
+constexpr const char* kAnyName = "XXXXXX";  // mkdtemp puts as many other characters there
+
+/// Folders in progress of a destination begin with this, then come six characters that nobody else has.
+std::string partial_prefix(const fs::path& destination) { return "." + destination.filename().string() + ".partial-"; }
+
+int open_folder(const fs::path& folder) {
+  return open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+}
+
+/// Removes what processes that were killed left beside `destination`: who is still at work in a folder holds its lock.
+void remove_abandoned_folders(const fs::path& destination) {
+  const std::string prefix = partial_prefix(destination);
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(destination.parent_path(), ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(prefix) || name.size() != prefix.size() + std::strlen(kAnyName)) continue;
+    const int descriptor = open_folder(entry.path());
+    if (descriptor < 0) continue;
+    if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) fs::remove_all(entry.path(), ignored);
+    close(descriptor);
+  }
+}
+
+/// Two folders change places in one step. False where that cannot be done, and nothing changed.
+bool exchange(const fs::path& a, const fs::path& b) {
+  return renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0;
+}
+
 }  // namespace
 
 FolderInProgress::FolderInProgress(const fs::path& destination)
@@ -32,11 +64,17 @@ FolderInProgress::FolderInProgress(const fs::path& destination)
   if (const auto here = device_of(destination_), around = device_of(parent); here && around && *here != *around)
     throw IoError(describe_mismatch(destination.string(), "output folder", "one that can be made or replaced",
                                     "a mount point (a folder within it will do)"));
-  std::string pattern =
-      (parent / fs::path(".").concat(destination_.filename().string()).concat(".partial-XXXXXX")).string();
-  if (mkdtemp(pattern.data()) == nullptr)
-    throw IoError(parent.string() + ": a folder cannot be made in it: " + std::strerror(errno));
-  path_ = pattern;
+  remove_abandoned_folders(destination_);
+  do {
+    if (descriptor_ >= 0) close(descriptor_);
+    std::string pattern = (parent / (partial_prefix(destination_) + kAnyName)).string();
+    if (mkdtemp(pattern.data()) == nullptr)
+      throw IoError(parent.string() + ": a folder cannot be made in it: " + std::strerror(errno));
+    path_ = pattern;
+    descriptor_ = open_folder(path_);
+    if (descriptor_ >= 0) (void)flock(descriptor_, LOCK_EX);
+    // Whoever tidied up before it was locked took the folder: another one, then.
+  } while (!fs::exists(path_));
   std::error_code ignored;
   fs::permissions(path_, fs::perms(0755), ignored);
 }
@@ -44,14 +82,17 @@ FolderInProgress::FolderInProgress(const fs::path& destination)
 FolderInProgress::~FolderInProgress() {
   std::error_code ignored;
   if (!path_.empty()) fs::remove_all(path_, ignored);
+  if (descriptor_ >= 0) close(descriptor_);
 }
 
 void FolderInProgress::commit() {
   std::error_code fault, ignored;
   if (!fs::exists(destination_, ignored)) {
     fs::rename(path_, destination_, fault);
+  } else if (exchange(path_, destination_)) {
+    fs::remove_all(path_, ignored);
   } else {
-    // The old folder keeps its place until the new one is whole, and gets it back if the new one cannot take it.
+    // A file system that cannot exchange: the old folder gets its place back if the new one cannot take it.
     const fs::path old = fs::path(path_).concat(".old");
     fs::rename(destination_, old, fault);
     if (!fault) {

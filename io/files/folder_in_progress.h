@@ -5,7 +5,7 @@
 namespace felt {
 
 /// A folder that takes its final name when it is whole, and disappears otherwise. Until then it lies beside its
-/// destination under a name that nobody else has.
+/// destination under a name that nobody else has; what a process that was killed left there is removed by the next one.
 class FolderInProgress {
 public:
   /// Throws IoError where no folder can be made beside `destination`, such as where that place does not exist, and
@@ -22,6 +22,7 @@ public:
 
 private:
   std::filesystem::path destination_, path_;
+  int descriptor_ = -1;  ///< holds the folder's lock
 };
 
 }  // namespace felt

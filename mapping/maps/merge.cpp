@@ -135,13 +135,15 @@ void merge_even_evidence(std::span<const Block* const> from, BlockStore& store, 
   for (int i = 0; i < kBlockVoxels; ++i) to.even_evidence->value[i] = float(sum[i]);
 }
 
-/// Brings the evidence of voxels that have more than the cap down to it, all classes alike.
+/// Brings the evidence of voxels that have more than the cap down to it, all classes alike. A voxel that was capped
+/// before may be beyond it by what that rounded, and keeps its values: a map merged with nothing stays the same.
 void cap_evidence(Block& block, float max_evidence) {
+  constexpr double kRounding = 1e-5;
   float share[kBlockVoxels];
   for (int i = 0; i < kBlockVoxels; ++i) {
     double total = block.even_evidence == nullptr ? 0 : double(block.even_evidence->value[i]);
     for (const EvidencePlane& plane : block.evidence) total += double(plane.counts->value[i]);
-    share[i] = total > double(max_evidence) ? float(double(max_evidence) / total) : 1.0f;
+    share[i] = total > double(max_evidence) * (1 + kRounding) ? float(double(max_evidence) / total) : 1.0f;
   }
   const auto scale = [&](Plane& plane) {
     for (int i = 0; i < kBlockVoxels; ++i) plane.value[i] *= share[i];

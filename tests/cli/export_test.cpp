@@ -357,6 +357,16 @@ TEST_CASE("an export that cannot be finished is refused before it writes anythin
   refused(" --mesh " + quoted(ply) + " --half", 2);
 }
 
+TEST_CASE("an export removes what one that was killed had written of the same file") {
+  const TouchedFloor floor;
+  const fs::path folder = floor.directory.path(), killed = folder / "out.part-7-0.ply",
+                 mine = folder / "out.part-7.ply";
+  for (const fs::path& file : {killed, mine}) std::ofstream(file) << "half";
+  REQUIRE(run_feltmap("export " + quoted(floor.map) + " --mesh " + quoted(folder / "out.ply")).exit_code == 0);
+  CHECK_FALSE(fs::exists(killed));
+  CHECK(fs::exists(mine));
+}
+
 TEST_CASE("values that 16 bits cannot hold keep 32, and a warning says of which grids") {
   TouchedFloor floor;
   Map map = load_map(floor.map);

@@ -291,4 +291,7 @@ TEST_CASE("even evidence counts for the cap and is brought down with that of the
   }
   CHECK(cut > 1000);
   CHECK(only_by_even > 100);
+  // What has been at the cap before stays as it is.
+  const Map* const alone[] = {&capped};
+  CHECK(map_hash(merge(alone, {.max_evidence = 5})) == map_hash(capped));
 }
