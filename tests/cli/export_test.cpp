@@ -351,6 +351,8 @@ TEST_CASE("an export that cannot be finished is refused before it writes anythin
   refused(" --vdb " + quoted(vdb) + " --mesh " + quoted(folder / "out.stl"), 3);
   refused(" --mesh " + quoted(ply) + " --points " + quoted(folder / "out.xyz"), 3);
   refused(" --mesh " + quoted(ply) + " --html " + quoted(folder / "nowhere" / "out.html"), 4);
+  refused(" --mesh not_written.ply --points ./not_written.ply", 3);
+  CHECK_FALSE(fs::exists("not_written.ply"));
   // Nor does it pass over what would do nothing.
   refused(" --vdb " + quoted(vdb) + " --color-by class", 2);
   refused(" --mesh " + quoted(ply) + " --up -y", 2);
