@@ -65,7 +65,7 @@ void check(const ExportOptions& o) {
   for (const auto& [option, file] :
        {std::pair("--vdb", o.vdb), {"--mesh", o.mesh}, {"--points", o.points}, {"--html", o.html}})
     if (!file.empty())
-      // Made absolute first: "out.ply" and "./out.ply" have the same name only then where there is no such file yet.
+      // Absolute first: of a file that does not exist yet, "out.ply" and "./out.ply" stay two names otherwise.
       if (const auto [other, is_new] = uses.emplace(fs::weakly_canonical(fs::absolute(file)), option); !is_new)
         problems.add(describe_mismatch(option, "file", "another one than " + other->second, file.string()));
   problems.throw_if_any();

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "io/files/file_lock.h"
 
 namespace felt {
 namespace fs = std::filesystem;
@@ -120,14 +121,9 @@ void AtomicFile::commit() {
 void remove_abandoned_parts(const fs::path& destination) {
   const fs::path folder = destination.has_parent_path() ? destination.parent_path() : fs::path(".");
   std::error_code fault;
-  for (const auto& entry : fs::directory_iterator(folder, fault)) {
-    const fs::path& path = entry.path();
-    if (!is_part_of(path.filename(), destination) || !entry.is_regular_file(fault)) continue;
-    const int descriptor = open(path.c_str(), O_WRONLY | O_CLOEXEC);
-    if (descriptor < 0) continue;
-    if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) unlink(path.c_str());
-    close(descriptor);
-  }
+  for (const auto& entry : fs::directory_iterator(folder, fault))
+    if (is_part_of(entry.path().filename(), destination) && entry.is_regular_file(fault))
+      remove_unless_locked(entry.path());
 }
 
 void write_file_atomically(const fs::path& destination, std::string_view bytes) {

@@ -21,4 +21,7 @@ private:
   int descriptor_ = -1;
 };
 
+/// Removes a file or folder, unless some process holds its lock or that cannot be known.
+void remove_unless_locked(const std::filesystem::path& path);
+
 }  // namespace felt

@@ -3,9 +3,7 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <sys/file.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -30,21 +28,14 @@ constexpr const char* kAnyName = "XXXXXX";  // mkdtemp puts as many other charac
 /// Folders in progress of a destination begin with this, then come six characters that nobody else has.
 std::string partial_prefix(const fs::path& destination) { return "." + destination.filename().string() + ".partial-"; }
 
-int open_folder(const fs::path& folder) {
-  return open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-}
-
 /// Removes what processes that were killed left beside `destination`: who is still at work in a folder holds its lock.
 void remove_abandoned_folders(const fs::path& destination) {
   const std::string prefix = partial_prefix(destination);
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(destination.parent_path(), ignored)) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with(prefix) || name.size() != prefix.size() + std::strlen(kAnyName)) continue;
-    const int descriptor = open_folder(entry.path());
-    if (descriptor < 0) continue;
-    if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) fs::remove_all(entry.path(), ignored);
-    close(descriptor);
+    if (name.starts_with(prefix) && name.size() == prefix.size() + std::strlen(kAnyName))
+      remove_unless_locked(entry.path());
   }
 }
 
@@ -66,13 +57,12 @@ FolderInProgress::FolderInProgress(const fs::path& destination)
                                     "a mount point (a folder within it will do)"));
   remove_abandoned_folders(destination_);
   do {
-    if (descriptor_ >= 0) close(descriptor_);
     std::string pattern = (parent / (partial_prefix(destination_) + kAnyName)).string();
     if (mkdtemp(pattern.data()) == nullptr)
       throw IoError(parent.string() + ": a folder cannot be made in it: " + std::strerror(errno));
     path_ = pattern;
-    descriptor_ = open_folder(path_);
-    if (descriptor_ >= 0) (void)flock(descriptor_, LOCK_EX);
+    constexpr double kPatience_s = 60;
+    lock_.emplace(path_, FileLock::Kind::exclusive, kPatience_s);
     // Whoever tidied up before it was locked took the folder: another one, then.
   } while (!fs::exists(path_));
   std::error_code ignored;
@@ -82,7 +72,6 @@ FolderInProgress::FolderInProgress(const fs::path& destination)
 FolderInProgress::~FolderInProgress() {
   std::error_code ignored;
   if (!path_.empty()) fs::remove_all(path_, ignored);
-  if (descriptor_ >= 0) close(descriptor_);
 }
 
 void FolderInProgress::commit() {

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+
+#include "io/files/file_lock.h"
 
 namespace felt {
 
@@ -22,7 +25,7 @@ public:
 
 private:
   std::filesystem::path destination_, path_;
-  int descriptor_ = -1;  ///< holds the folder's lock
+  std::optional<FileLock> lock_;  ///< says that somebody is at work there
 };
 
 }  // namespace felt
