@@ -66,11 +66,14 @@ int written(int code) {
   return fail(kInputOutput, "standard output: cannot be written");
 }
 
-/// The first word that gives an option nothing ("--out="), as a shell makes of a variable that is not set: CLI11 would
-/// take the next word for the value.
-std::string option_without_value(int argc, char** argv) {
-  for (int i = 1; i < argc; ++i)
-    if (const std::string word = argv[i]; word.starts_with("--") && word.ends_with('=')) return word;
+/// The first word that is empty or gives an option nothing ("--out="), as a shell makes of a variable that is not set,
+/// with its option; else nothing. CLI11 would take the next word for the value, and commands an empty one for none.
+std::string word_without_value(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i], before = argv[i - 1];
+    if (word.starts_with("--") && word.ends_with('=')) return word;
+    if (word.empty()) return (before.starts_with("--") ? before + " " : "") + "\"\"";
+  }
   return "";
 }
 
@@ -102,7 +105,7 @@ int run(int argc, char** argv) {
   CLI::App app("Dense volumetric mapping that knows what things are and how they feel", "feltmap");
   app.formatter(std::make_shared<HelpFormatter>());
   add_commands(app);
-  if (const std::string word = option_without_value(argc, argv); !word.empty())
+  if (const std::string word = word_without_value(argc, argv); !word.empty())
     return fail(kUsage, "'" + word + "': expected a value, found none (see feltmap --help)");
   try {
     app.parse(argc, argv);

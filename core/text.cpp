@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstdio>
 #include <numeric>
 #include <utility>
@@ -12,6 +13,14 @@ std::string number_text(double value, const char* format) {
   std::string text(size_t(snprintf(nullptr, 0, format, value)), '\0');
   snprintf(text.data(), text.size() + 1, format, value);
   return text;
+}
+
+std::string point_text(double x_m, double y_m, double z_m) {
+  constexpr double kMillimetresHold_m = 1e12;  // of a double
+  std::string text;
+  for (const double metres : {x_m, y_m, z_m})
+    text += (text.empty() ? "(" : ", ") + number_text(metres, std::abs(metres) < kMillimetresHold_m ? "%.3f" : "%g");
+  return text + ")";
 }
 
 std::string hexadecimal(uint64_t value) {

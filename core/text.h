@@ -11,6 +11,9 @@ namespace felt {
 /// A number in printf's words; `format` takes one double.
 std::string number_text(double value, const char* format = "%g");
 
+/// "(x, y, z)" to the millimetre, and shorter where a coordinate is too large for that to mean anything.
+std::string point_text(double x_m, double y_m, double z_m);
+
 /// All 16 hexadecimal digits of a number, in small letters.
 std::string hexadecimal(uint64_t value);
 

@@ -230,7 +230,7 @@ void add_export(CLI::App& app) {
                                   *o, [o] { return run(*o); });
   command.add_option("MAP", o->map, "A map file")->required();
   command.add_option("--mesh", o->mesh, "Surface mesh, by extension: .ply, .glb or .obj");
-  command.add_option("--points", o->points, "The mesh's vertices with normals and colours: .ply");
+  command.add_option("--points", o->points, "The mesh's vertices with normals and colours, by extension as --mesh");
   command.add_option("--html", o->html, "A page that shows the mesh in a browser, without a network");
   o->up_option =
       command.add_option("--up", o->up, "Axis of the map that points up on that page at first: +x, -x, +y, ... -z")

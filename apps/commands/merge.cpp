@@ -85,12 +85,7 @@ void warn_of_what_does_not_add(const std::vector<Map>& maps, const MergeOptions&
   if (maps.size() < 2) return;
   if (any_run_with(maps, "carve"))
     spdlog::warn("maps made with --carve: what one of them saw free does not erase what only another holds");
-  std::vector<std::string> different;
-  for (const char* key : {"distance", "weight", "dropoff_start_vox", "min_depth_m", "max_depth_m", "color_band_vox",
-                          "label_band_vox", "label_evidence"})
-    if (const std::set<std::string> values = values_of_runs(maps, key); values.size() > 1)
-      different.push_back(std::string(key) + ": " + *values.begin() + " and " + *values.rbegin());
-  if (!different.empty())
+  if (const std::vector<std::string> different = different_settings(maps); !different.empty())
     spdlog::warn("maps fused with different settings ({}): what is added up was not measured alike", listed(different));
   warn_of_different_readings(maps);
   const auto any_above_zero = [&](const char* key) {

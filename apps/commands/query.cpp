@@ -14,6 +14,7 @@
 #include "apps/options/number_checks.h"
 #include "apps/options/touch_options.h"
 #include "apps/output/belief_report.h"
+#include "core/text.h"
 #include "io/map_file/map_file.h"
 #include "io/readings/points.h"
 
@@ -121,7 +122,7 @@ int run_query(const QueryOptions& options) {
   }
   for (size_t i = 0; i < points.size(); ++i) {
     const json& a = all[i];
-    std::printf("(%.3f, %.3f, %.3f): ", points[i].x(), points[i].y(), points[i].z());
+    std::printf("%s: ", point_text(points[i].x(), points[i].y(), points[i].z()).c_str());
     if (a.contains("reason")) {
       std::printf("%s\n", a["reason"].get<std::string>().c_str());
       continue;

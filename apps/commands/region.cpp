@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +10,8 @@
 #include "apps/options/number_checks.h"
 #include "apps/options/touch_options.h"
 #include "apps/output/belief_report.h"
+#include "apps/output/output_files.h"
+#include "core/error.h"
 #include "io/map_file/map_file.h"
 #include "io/meshes/mesh_io.h"
 #include "mapping/surface/region_mesh.h"
@@ -21,10 +24,21 @@ using json = nlohmann::ordered_json;
 struct RegionCommandOptions : CommonOptions {
   std::string map, at, mesh, properties;
   std::optional<double> below;
+  bool overwrite = false;
   RegionOptions region;
 };
 
+/// Before any work: the mesh can be written, and replaces neither the map nor, without being told to, another file.
+void check_mesh(const RegionCommandOptions& options) {
+  if (options.mesh.empty()) return;
+  require_mesh_name(options.mesh);
+  if (std::filesystem::weakly_canonical(options.mesh) == std::filesystem::weakly_canonical(options.map))
+    throw ConfigError(describe_mismatch("--mesh", "file", "another one than the map that is read", options.mesh));
+  require_no_file(options.mesh, options.overwrite);
+}
+
 int run_region(const RegionCommandOptions& options) {
+  check_mesh(options);
   Map map = load_map(options.map);
   const RegionSettings settings = options.region.resolved(map);
   use_properties(map, options.properties);
@@ -68,7 +82,8 @@ void add_region(CLI::App& app) {
                                   *options, [options] { return run_region(*options); });
   command.add_option("MAP", options->map, "Map file")->required();
   command.add_option("--at", options->at, "World point, metres: x,y,z")->check(check_point)->required();
-  command.add_option("--mesh", options->mesh, "Write the region's surface (.ply, .obj, .glb)");
+  CLI::Option* mesh = command.add_option("--mesh", options->mesh, "Write the region's surface (.ply, .obj, .glb)");
+  command.add_flag("--force", options->overwrite, "Replace a mesh that exists")->needs(mesh);
   command.add_option("--properties", options->properties,
                      "Property table (YAML), instead of the one that the map may have");
   command.add_option("--below", options->below, "Probability that a property is at most this")->check(finite());

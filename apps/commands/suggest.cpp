@@ -10,6 +10,7 @@
 #include "apps/options/run_settings.h"
 #include "apps/options/touch_options.h"
 #include "apps/output/belief_report.h"
+#include "core/text.h"
 #include "io/map_file/map_file.h"
 #include "mapping/touch/touch_suggestion.h"
 
@@ -60,7 +61,7 @@ int run_suggest(const SuggestOptions& options) {
     return kDone;
   }
   for (const Suggestion& s : suggestions) {
-    std::printf("(%.3f, %.3f, %.3f): gain %.3f nat on %.3f m2\n", s.point_m.x(), s.point_m.y(), s.point_m.z(),
+    std::printf("%s: gain %.3f nat on %.3f m2\n", point_text(s.point_m.x(), s.point_m.y(), s.point_m.z()).c_str(),
                 s.gain_nat, s.area_m2);
     for (const Outcome& o : s.outcomes)
       std::printf("  %.0f %%: %s %.3g would make it %s %.2f\n", 100 * o.probability, options.property.c_str(),

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "io/files/json_text.h"
@@ -16,6 +17,21 @@ nlohmann::json settings_of(const FusedFrames& run) {
   return settings.is_object() ? settings : nlohmann::json::object();
 }
 
+/// By name, those of perception among the others; of contents (a confusion matrix, a network) the first digits of the
+/// hash, which a person can tell apart.
+std::map<std::string, std::string> settings_as_text(const FusedFrames& run) {
+  constexpr size_t kDigits = 8;
+  nlohmann::json settings = settings_of(run);
+  if (const nlohmann::json perception = settings.value("perception", nlohmann::json()); perception.is_object())
+    settings.update(perception);
+  settings.erase("perception");
+  std::map<std::string, std::string> text;
+  for (const auto& [key, value] : settings.items())
+    text[key] =
+        key.ends_with("_content") && value.is_string() ? value.get<std::string>().substr(0, kDigits) : json_text(value);
+  return text;
+}
+
 }  // namespace
 
 std::set<double> numbers_of_runs(std::span<const Map> maps, const std::string& key) {
@@ -27,13 +43,40 @@ std::set<double> numbers_of_runs(std::span<const Map> maps, const std::string& k
   return numbers;
 }
 
-std::set<std::string> values_of_runs(std::span<const Map> maps, const std::string& key) {
-  std::set<std::string> values;
+std::vector<std::string> different_settings(std::span<const Map> maps) {
+  const std::set<std::string> of_merge = {"voxel_size_m", "truncation_m",    "max_weight",     "carve", "label_cap",
+                                          "class_prior",  "label_novelty_m", "label_turn_deg", "color", "instances"};
+  const std::set<std::string> of_a_recording = {"format",       "intrinsics",    "depth_scale", "pose_convention",
+                                                "distortion",   "T_body_camera", "ray_length",  "depth_encoding",
+                                                "label_offset", "max_dt_s",      "bgr",         "stamp_offset"};
+  struct Run {
+    std::string recording;
+    std::map<std::string, std::string> settings;
+  };
+  std::vector<Run> runs;
+  std::set<std::string> keys;
   for (const Map& map : maps)
-    for (const FusedFrames& run : map.frames.runs)
-      if (const nlohmann::json settings = settings_of(run); settings.contains(key))
-        values.insert(json_text(settings[key]));
-  return values;
+    for (const FusedFrames& fused : map.frames.runs)
+      if (const auto settings = settings_as_text(fused); !settings.empty()) {
+        for (const auto& [key, value] : settings)
+          if (!of_merge.contains(key)) keys.insert(key);
+        runs.push_back({fused.sequence, settings});
+      }
+  std::vector<std::string> different;
+  for (const std::string& key : keys) {
+    std::map<std::string, std::set<std::string>> values;  // by recording, where that matters
+    for (const Run& run : runs) {
+      const auto found = run.settings.find(key);
+      values[of_a_recording.contains(key) ? run.recording : ""].insert(found == run.settings.end() ? "none"
+                                                                                                   : found->second);
+    }
+    for (const auto& [recording, unlike] : values)
+      if (unlike.size() > 1) {
+        different.push_back(key + ": " + *unlike.begin() + " and " + *unlike.rbegin());
+        break;
+      }
+  }
+  return different;
 }
 
 bool any_run_with(std::span<const Map> maps, const std::string& flag) {

@@ -3,6 +3,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "mapping/map.h"
 
@@ -13,8 +14,11 @@ namespace felt::apps {
 /// Every number that runs have under this key.
 std::set<double> numbers_of_runs(std::span<const Map> maps, const std::string& key);
 
-/// Every value that runs have under this key, as JSON text.
-std::set<std::string> values_of_runs(std::span<const Map> maps, const std::string& key);
+/// What runs were fused with that makes what they measured unlike: "weight: constant and inverse-square". Settings that
+/// a recording may need for itself (camera, numbering of its labels, ...) are compared within a recording only. Not
+/// said: what `merge` refuses or has a rule for (voxels, classes, caps), and what only decides whether something is
+/// kept at all (colours, instances).
+std::vector<std::string> different_settings(std::span<const Map> maps);
 
 /// Whether a run was made with this flag.
 bool any_run_with(std::span<const Map> maps, const std::string& flag);

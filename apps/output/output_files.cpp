@@ -57,12 +57,21 @@ size_t evidence_missing_from(const Map& map, const Map& older) {
   return missing;
 }
 
-/// Touches of an older map that count, and in the new one do not (`undone_too`) or are not known at all.
-size_t touches_missing_from(const TouchJournal& journal, const TouchJournal& older, bool undone_too) {
-  return size_t(std::count_if(older.touches.begin(), older.touches.end(), [&](const Touch& touch) {
+/// Touches that count in an older map and not in the new one.
+struct MissingTouches {
+  size_t unknown = 0;  ///< to the new one
+  size_t undone = 0;   ///< in the new one
+};
+
+MissingTouches touches_missing_from(const TouchJournal& journal, const TouchJournal& older) {
+  MissingTouches missing;
+  for (const Touch& touch : older.touches) {
+    if (touch.undone) continue;
     const Touch* kept = journal.find(touch.id);
-    return !touch.undone && (kept == nullptr || (undone_too && kept->undone));
-  }));
+    missing.unknown += kept == nullptr;
+    missing.undone += kept != nullptr && kept->undone;
+  }
+  return missing;
 }
 
 /// What an older map holds that the new one does not, in words; empty where there is nothing.
@@ -73,11 +82,13 @@ std::string missing_from(const Map& map, const Map& older, LostTouches touches) 
   if (older.frames.runs.empty() && !map.frames.runs.empty()) return "a map that does not say of what it was made";
   size_t lost_frames = 0;
   for (const FusedFrames& run : older.frames.runs) lost_frames += frames_missing_from(map.frames, run);
-  const size_t lost_touches =
-      touches == LostTouches::refuse ? touches_missing_from(map.touches, older.touches, true) : 0;
-  if (lost_frames > 0 || lost_touches > 0)
-    return "a map with " + std::to_string(lost_frames) + " frames and " + std::to_string(lost_touches) +
+  const MissingTouches lost_touches =
+      touches == LostTouches::refuse ? touches_missing_from(map.touches, older.touches) : MissingTouches();
+  if (lost_frames > 0 || lost_touches.unknown > 0)
+    return "a map with " + std::to_string(lost_frames) + " frames and " + std::to_string(lost_touches.unknown) +
            " touches that the new one does not hold";
+  if (lost_touches.undone > 0)
+    return "a map where " + std::to_string(lost_touches.undone) + " touches count that are undone in the new one";
   // A part that was cut out has the whole journal of frames.
   if (const size_t voxels = voxels_missing_from(map, older); voxels > 0)
     return "a map with " + std::to_string(voxels) + " observed voxels that the new one does not hold";
@@ -87,8 +98,18 @@ std::string missing_from(const Map& map, const Map& older, LostTouches touches) 
   return "";
 }
 
-/// Where a file lies, also where it is named without a folder.
-fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
+/// Where a file lies or will lie, also where it is named without a folder. Throws IoError where it cannot.
+fs::path folder_of_output(const fs::path& destination) {
+  require_file_place(destination);
+  const fs::path file = linked_file(destination);
+  return file.has_parent_path() ? file.parent_path() : fs::path(".");
+}
+
+/// Whether anybody may write to it, by its mode: `access` says yes to the superuser whatever that is.
+bool is_made_read_only(const fs::path& file) {
+  constexpr fs::perms kWrite = fs::perms::owner_write | fs::perms::group_write | fs::perms::others_write;
+  return (fs::status(file).permissions() & kWrite) == fs::perms::none;
+}
 
 }  // namespace
 
@@ -114,15 +135,21 @@ void require_no_files(const fs::path& folder, const std::vector<std::string>& na
 }
 
 void require_no_file(const fs::path& file, bool overwrite) {
+  require_file_place(file);
   if (!overwrite && fs::exists(file))
     throw IoError(describe_mismatch(file.string(), "output exists", "no file there, or --force to replace it", "one"));
   remove_abandoned_parts(linked_file(file));
 }
 
 void require_writable(const fs::path& file, bool overwrite) {
-  if (!overwrite && fs::is_regular_file(file) && access(file.c_str(), W_OK) != 0)
-    throw IoError(describe_mismatch(file.string(), "output exists", "a file that may be written, or --force",
-                                    std::strerror(errno)));
+  if (overwrite || !fs::is_regular_file(file)) return;
+  std::string reason;
+  if (is_made_read_only(file))
+    reason = "one that was made read-only";
+  else if (access(file.c_str(), W_OK) != 0)
+    reason = std::strerror(errno);
+  if (!reason.empty())
+    throw IoError(describe_mismatch(file.string(), "output exists", "a file that may be written, or --force", reason));
 }
 
 void require_nothing_lost(const fs::path& file, const Map& replacement, LostTouches touches, bool overwrite) {
@@ -132,7 +159,7 @@ void require_nothing_lost(const fs::path& file, const Map& replacement, LostTouc
   try {
     const Map older = load_map(file);
     lost = missing_from(replacement, older, touches);
-    forgotten_touches = touches_missing_from(replacement.touches, older.touches, false);
+    forgotten_touches = touches_missing_from(replacement.touches, older.touches).unknown;
   } catch (const Error&) {
     lost = "a file that is no map that can be read";
   }
@@ -162,7 +189,7 @@ void warn_if_coarse(const TriangleMesh& mesh, const fs::path& file) {
 }
 
 MapWriting::MapWriting(const fs::path& file, bool overwrite)
-    : folder_(folder_of(linked_file(file)), FileLock::Kind::shared, 1), file_(file, FileLock::Kind::exclusive, 60) {
+    : folder_(folder_of_output(file), FileLock::Kind::shared, 1), file_(file, FileLock::Kind::exclusive, 60) {
   require_writable(file, overwrite);
   remove_abandoned_parts(linked_file(file));
 }

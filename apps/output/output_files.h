@@ -19,11 +19,12 @@ void prepare_output_folder(const std::filesystem::path& folder);
 /// write there while one waits for the lock.
 void require_no_files(const std::filesystem::path& folder, const std::vector<std::string>& names, bool overwrite);
 
-/// The same for one file: throws IoError where it exists unless `overwrite`, and removes half-written ones.
+/// The same for one file: throws IoError where it exists unless `overwrite`, and where it is no file at all, and
+/// removes half-written ones.
 void require_no_file(const std::filesystem::path& file, bool overwrite);
 
 /// Throws IoError where the file was made read-only, unless `overwrite`: files are replaced by renaming, which would
-/// not ask.
+/// not ask. For the superuser, too, whom the system would let write.
 void require_writable(const std::filesystem::path& file, bool overwrite);
 
 /// What is done about touches that count in a map and not in the one that replaces it.
@@ -47,7 +48,8 @@ void warn_if_coarse(const TriangleMesh& mesh, const std::filesystem::path& file)
 
 /// Keeps other commands from a map file, and runs of reconstruct from its folder, while it is replaced by what is made
 /// of it: make one before the map is read. Waits for other commands up to a minute. Half-written files of commands that
-/// were killed are removed. Throws IoError, also for a file that was made read-only, unless `overwrite`.
+/// were killed are removed. Throws IoError, at once for what is no file, and for one that was made read-only, unless
+/// `overwrite`.
 class MapWriting {
 public:
   MapWriting(const std::filesystem::path& file, bool overwrite);

@@ -57,15 +57,22 @@ fs::path linked_file(fs::path path) {
   return path;
 }
 
+void require_file_place(const fs::path& destination) {
+  const fs::path file = linked_file(destination);
+  const auto refuse = [&](const char* found) {
+    throw IoError(describe_mismatch(destination.string(), "output", "a regular file or a new name", found));
+  };
+  if (std::error_code error; fs::is_symlink(file, error)) refuse(std::strerror(ELOOP));
+  struct stat existing {};
+  if (stat(file.c_str(), &existing) == 0 && !S_ISREG(existing.st_mode))
+    refuse(S_ISDIR(existing.st_mode) ? "a folder" : "a special file");
+  if (destination.filename().empty()) refuse("the name of a folder");
+}
+
 AtomicFile::AtomicFile(const fs::path& destination) : shown_(destination), destination_(linked_file(destination)) {
-  if (destination.filename().empty())
-    throw IoError(describe_mismatch(destination.string(), "output", "a file name", "none"));
-  if (std::error_code error; fs::is_symlink(destination_, error)) fail("follow its links", ELOOP);
+  require_file_place(destination);
   struct stat existing {};
   const bool replaces = stat(destination_.c_str(), &existing) == 0;
-  if (replaces && !S_ISREG(existing.st_mode))
-    throw IoError(describe_mismatch(destination.string(), "output", "a regular file or a new name",
-                                    S_ISDIR(existing.st_mode) ? "a folder" : "a special file"));
   static std::atomic<unsigned> serial = 0;
   do {
     fs::path name = part_prefix(destination_);

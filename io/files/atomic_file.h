@@ -12,6 +12,9 @@ namespace felt {
 /// (a ring) is returned itself.
 std::filesystem::path linked_file(std::filesystem::path path);
 
+/// Throws IoError where a file cannot be put: the path ends in no name, names a folder or a device, or links in a ring.
+void require_file_place(const std::filesystem::path& destination);
+
 /// A file that appears whole or not at all. It is written beside its destination under a name that ends in the same
 /// extension; `commit` flushes it to the disk and renames it over the destination, and destruction without `commit`
 /// removes it, so that an older file stays intact until the new one is whole.
@@ -21,8 +24,8 @@ std::filesystem::path linked_file(std::filesystem::path path);
 /// device").
 class AtomicFile {
 public:
-  /// Creates the temporary file. The folder must exist; a destination that is a folder or a device is refused, and
-  /// through a symbolic link the file it names is replaced.
+  /// Creates the temporary file. The folder must exist, and the destination is one of `require_file_place`; through a
+  /// symbolic link the file it names is replaced.
   explicit AtomicFile(const std::filesystem::path& destination);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;

@@ -136,11 +136,9 @@ Region segment_around(const Map& map, const Contact& contact, const RegionSettin
 }  // namespace
 
 Contact find_contact(const Map& map, const Eigen::Vector3d& point_m, const RegionSettings& settings) {
-  char where[96];
-  snprintf(where, sizeof where, "point (%.3f, %.3f, %.3f)", point_m.x(), point_m.y(), point_m.z());
+  const std::string point = point_text(point_m.x(), point_m.y(), point_m.z()), where = "point " + point;
   if (!nearest_voxel(map, point_m))
-    throw TouchError(
-        describe_mismatch(where, "contact", "three finite coordinates inside the map", std::string(where).substr(6)));
+    throw TouchError(describe_mismatch(where, "contact", "three finite coordinates inside the map", point));
   const SurfaceRule band = band_rule(map, settings);
   const Eigen::Vector3d q = point_m / map.voxel_size_m;
   const double radius = settings.snap_voxels;

@@ -1,10 +1,10 @@
 // Nothing that a map holds is lost to a name, a neighbour or another command.
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <future>
+#include <nlohmann/json.hpp>
 
 #include "io/files/file_lock.h"
 #include "io/images/image_encode.h"
@@ -114,7 +114,60 @@ TEST_CASE("a touched copy and a merged map replace only what they hold") {
   refused(merge + quoted(finer / "map.vdb"), 4, "voxels");
   const fs::path touched = recording.folder.path() / "touched.vdb";
   REQUIRE(run_feltmap(recording.touch() + " --out " + quoted(touched)).exit_code == 0);
-  refused(merge + quoted(touched), 4, "1 touches");
+  refused(merge + quoted(touched), 4, "1 touches that the new one does not hold");
+  const fs::path undone = recording.folder.path() / "undone.vdb";
+  const std::string id = id_text(load_map(touched).touches.touches.at(0).id);
+  REQUIRE(run_feltmap("touch " + quoted(touched) + " --undo " + id + " --out " + quoted(undone)).exit_code == 0);
+  refused("merge " + quoted(undone) + " --out " + quoted(touched), 4,
+          "a map where 1 touches count that are undone in the new one");
+}
+
+TEST_CASE("an output that names a folder is refused at once, however the folder is spelled") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const fs::path folder = recording.folder.path() / "folder", link = recording.folder.path() / "link";
+  fs::create_directory(folder);
+  fs::create_directory_symlink(folder, link);
+  for (const fs::path& out : {folder, folder / "", folder / ".", fs::path("."), fs::path("/"), link}) {
+    const std::string reason = "expected a regular file or a new name, found a folder";
+    refused("merge " + quoted(recording.map) + " --out " + quoted(out), 4, reason);
+    refused(recording.touch() + " --out " + quoted(out), 4, reason);
+    refused("export " + quoted(recording.map) + " --force --vdb " + quoted(out), 4, reason);
+  }
+  refused("merge " + quoted(recording.map) + " --out " + quoted(recording.folder.path() / "new" / ""), 4, "folder");
+  fs::create_symlink("ring", recording.folder.path() / "ring");
+  refused("merge " + quoted(recording.map) + " --out " + quoted(recording.folder.path() / "ring"), 4, "symbolic links");
+  CHECK(fs::is_empty(folder));
+}
+
+TEST_CASE("the mesh of a region replaces neither the map nor, unless told to, another file") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  // A map may be called anything.
+  const fs::path map = recording.out / "map.ply", link = recording.out / "link.ply",
+                 mesh = recording.out / "region.ply";
+  fs::rename(recording.map, map);
+  fs::create_symlink(map, link);
+  const std::string before = file_text(map);
+  const CommandResult touch = run_feltmap(recording.touch("0.4", map) + " --dry-run --json");
+  REQUIRE(touch.exit_code == 0);
+  const nlohmann::json at = nlohmann::json::parse(touch.out)["touches"][0]["contact"]["surface_m"];
+  const auto region = [&](const fs::path& to) {
+    return "region " + quoted(map) + " --at=" + at[0].dump() + "," + at[1].dump() + "," + at[2].dump() +
+           " --region sphere --radius 0.3 --mesh " + quoted(to);
+  };
+  for (const fs::path& same : {map, link}) {
+    refused(region(same), 3, "--mesh: file: expected another one than the map that is read");
+    refused(region(same) + " --force", 3, "--mesh");
+  }
+  CHECK(file_text(map) == before);
+  REQUIRE(run_feltmap(region(mesh)).exit_code == 0);
+  write_text(mesh, "mine");
+  refused(region(mesh), 4, "expected no file there, or --force");
+  CHECK(file_text(mesh) == "mine");
+  CHECK(run_feltmap(region(mesh) + " --force").exit_code == 0);
+  CHECK(file_text(mesh) != "mine");
+  refused(region(recording.out / "region.stl"), 3, ".stl");
 }
 
 TEST_CASE("a map of the same frames with other labels is not replaced") {
@@ -172,28 +225,18 @@ TEST_CASE("a touched copy that replaces another says which touches are gone") {
   CHECK(load_map(copy).touches.touches.size() == 1);
 }
 
-TEST_CASE("a map that was made read-only is replaced only with --force") {
+TEST_CASE("a map that was made read-only is replaced only with --force, also by the superuser") {
   const Recording recording;
   REQUIRE(recording.reconstruct().exit_code == 0);
   fs::permissions(recording.map, fs::perms::owner_read | fs::perms::group_read | fs::perms::others_read);
-  // The superuser may write everywhere, unless that is taken away.
-  const std::string as_user = geteuid() == 0 ? "setpriv --bounding-set=-dac_override,-dac_read_search " : "";
-  if (!as_user.empty() && run_feltmap_within(as_user, "--version").exit_code != 0) {
-    skip("setpriv cannot take the superuser's rights away here");
-    return;
-  }
   const std::string before = file_text(recording.map);
   const std::string commands[] = {
       recording.touch(), "merge " + quoted(recording.map) + " --out " + quoted(recording.map),
       "reconstruct " + quoted(recording.sequence) + " --out " + quoted(recording.out) + " --voxel-size 0.05 --resume"};
-  for (const std::string& arguments : commands) {
-    const CommandResult result = run_feltmap_within(as_user, arguments);
-    INFO(arguments << "\n" << result.err);
-    CHECK(result.exit_code == 4);
-    CHECK_THAT(result.err, Contains("Permission denied") && Contains("--force"));
-  }
+  for (const std::string& arguments : commands)
+    refused(arguments, 4, "expected a file that may be written, or --force, found one that was made read-only");
   CHECK(file_text(recording.map) == before);
-  CHECK(run_feltmap_within(as_user, recording.touch() + " --force").exit_code == 0);
+  CHECK(run_feltmap(recording.touch() + " --force").exit_code == 0);
   CHECK(file_text(recording.map) != before);
 }
 

@@ -3,10 +3,12 @@
 #include <filesystem>
 #include <set>
 
+#include "io/images/image_encode.h"
 #include "io/map_file/map_file.h"
 #include "tests/cli/command.h"
 #include "tests/cli/recording.h"
 #include "tests/cli/sequences.h"
+#include "tests/support/data.h"
 #include "tests/support/random_map.h"
 #include "tests/support/recorded_sequence.h"
 
@@ -95,6 +97,36 @@ TEST_CASE("merging says that a recording was understood in two ways") {
              "camera: {fx: 20, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16}\ndepth_scale: 2500\n");
   CHECK_THAT(warnings_of_merge(recording, first + part(recording, "2:4", "scaled.vdb")),
              Contains("maps 1 and 2 are of one recording that was understood in two ways (depth scale)"));
+}
+
+TEST_CASE("merging says which settings of one recording's parts make their evidence unlike") {
+  const Recording recording;
+  write_text(recording.sequence / "confusion.csv", "x,wall,floor,sofa\nwall,8,1,1\nfloor,1,8,1\nsofa,1,1,8\n");
+  const std::string first = part(recording, "0:2", "first.vdb");
+  const auto warnings = [&](const std::string& options) {
+    return warnings_of_merge(recording, first + part(recording, "2:4", "second.vdb", options));
+  };
+  CHECK_THAT(warnings(""), !Contains("warning"));
+  CHECK_THAT(warnings("--max-weight 255 --no-color"), !Contains("settings"));  // nothing is measured otherwise
+  CHECK_THAT(warnings("--label-offset -1"), Contains("different settings (label_offset: -1 and none)"));
+  CHECK_THAT(warnings("--bgr"), Contains("different settings (bgr: none and true)"));
+  CHECK_THAT(warnings("--vote geometric"), Contains("vote: \"geometric\" and none"));
+  write_text(recording.folder.path() / "settings.yaml", "spread_rest: false\n");
+  CHECK_THAT(warnings("--config " + quoted(recording.folder.path() / "settings.yaml")),
+             Contains("different settings (spread_rest: false and true)"));
+  CHECK_THAT(warnings("--confusion " + quoted(recording.sequence / "confusion.csv")),
+             Contains("different settings (confusion_content: "));
+}
+
+TEST_CASE("merging does not mind that two recordings number their labels in two ways") {
+  const Recording recording, other(2);
+  write_bytes(other.sequence / "depth" / "0.png", encode_png(Image<uint16_t>(kWidth, kHeight, 3000)));
+  const std::string maps = part(recording, ":", "first.vdb") +
+                           part(other, ":", "second.vdb", "--label-offset -1 --bgr --intrinsics 21,20,11.5,7.5");
+  CHECK_THAT(warnings_of_merge(recording, maps), !Contains("settings"));
+  CHECK_THAT(warnings_of_merge(recording, part(recording, ":", "first.vdb") +
+                                              part(other, ":", "second.vdb", "--weight inverse-square")),
+             Contains("weight: "));
 }
 
 TEST_CASE("merging warns where class evidence depends on the viewpoints of one run") {

@@ -92,6 +92,14 @@ TEST_CASE("a run does not go on when its recording is understood in another way,
   CHECK(file_text(recording.map) == before);
 }
 
+TEST_CASE("a run does not go on with other stamps, and says that it is they and no other recording") {
+  const Recording recording;
+  REQUIRE(recording.reconstruct().exit_code == 0);
+  const CommandResult result = recording.reconstruct("--resume --stamp-offset 1");
+  CHECK(result.exit_code == 3);
+  CHECK_THAT(result.err, Contains("--resume: stamp_offset: expected null as in") && Contains("found 1.0"));
+}
+
 TEST_CASE("touches that come after a complete run are said not to be applied") {
   const Recording recording;
   REQUIRE(recording.reconstruct().exit_code == 0);

@@ -201,4 +201,18 @@ TEST_CASE("an option that a shell left without a value is named, and does not ta
   CHECK_THAT(result.err, Catch::Matchers::Contains("'--out=': expected a value"));
 }
 
+TEST_CASE("an empty word is no value, whatever the option") {
+  const auto refuses = [](const std::string& arguments, const std::string& what) {
+    const CommandResult result = run_feltmap(arguments);
+    INFO(arguments << "\n" << result.out << result.err);
+    CHECK(result.exit_code == 2);
+    CHECK_THAT(result.err, Catch::Matchers::Contains("'" + what + "': expected a value, found none"));
+    CHECK(result.out.empty());
+  };
+  refuses("export map.vdb --mesh out.ply --class ''", "--class \"\"");
+  refuses("query map.vdb --json --file ''", "--file \"\"");
+  refuses("touch map.vdb --undo ''", "--undo \"\"");
+  refuses("info ''", "\"\"");
+}
+
 }  // namespace felt::test

@@ -45,6 +45,11 @@ TEST_CASE("a list says its items in other words, by a function or a member") {
         "1 a, 2 b");
 }
 
+TEST_CASE("a point is said to the millimetre, and in few digits where it is beyond any place") {
+  CHECK(point_text(1, -0.25, 0.0004) == "(1.000, -0.250, 0.000)");
+  CHECK(point_text(1e300, 450000.1234, std::nan("")) == "(1e+300, 450000.123, nan)");
+}
+
 TEST_CASE("a number in hexadecimal digits has all sixteen") {
   CHECK(hexadecimal(0) == "0000000000000000");
   CHECK(hexadecimal(0x0123456789abcdef) == "0123456789abcdef");
