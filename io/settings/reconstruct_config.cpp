@@ -28,7 +28,8 @@ using ReadValue = std::function<void(const YAML::Node& value, const std::string&
 
 std::string text_of(const YAML::Node& value, const std::string& where, const std::string& expected) {
   if (!value.IsScalar() || value.Scalar().empty())
-    throw ConfigError(describe_mismatch(where, "value", expected, value.IsNull() ? "nothing" : "a list or table"));
+    throw ConfigError(describe_mismatch(where, "value", expected,
+                                        value.IsSequence() || value.IsMap() ? "a list or table" : "nothing"));
   return value.Scalar();
 }
 

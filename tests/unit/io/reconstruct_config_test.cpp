@@ -55,7 +55,7 @@ TEST_CASE("every problem of a configuration is reported at once with its line an
       file,
       "voxel_size: 0\nvoxelsize: 1\ntruncation: wide\nmax_depth: [1, 2]\nframes: 5\nweight: heavy\ncarve: maybe\n"
       "threads: -1\nlabels: nowhere\nmax_dt: 0,02\nmax_depth: 3\nintrinsics: [1, 2]\n"
-      "top: 65\nvote: loud\nsegment_color: 451\nsegmenter: nowhere\ncheckpoint: -1\n");
+      "top: 65\nvote: loud\nsegment_color: 451\nsegmenter: nowhere\ncheckpoint: -1\nconfusion: ''\n");
   try {
     read_reconstruct_config(file);
     FAIL("was accepted");
@@ -78,6 +78,7 @@ TEST_CASE("every problem of a configuration is reported at once with its line an
                              "config.yaml:13: top",
                              "config.yaml:14: vote",
                              "geometric, instances, none",
+                             "config.yaml:18: confusion: value: expected a path, found nothing",
                              "config.yaml:15: segment_color",
                              "from 0 to 450",
                              "config.yaml:16: segmenter",
