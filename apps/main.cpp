@@ -66,13 +66,15 @@ int written(int code) {
   return fail(kInputOutput, "standard output: cannot be written");
 }
 
-/// The first word that is empty or gives an option nothing ("--out="), as a shell makes of a variable that is not set,
-/// with its option; else nothing. CLI11 would take the next word for the value, and commands an empty one for none.
+/// The first word that is empty (a list of nothing, ",", too) or gives an option nothing ("--out="), as a shell makes
+/// of a variable that is not set, with its option; else nothing. CLI11 would take the next word for the value, and
+/// commands an empty one for none.
 std::string word_without_value(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i], before = argv[i - 1];
     if (word.starts_with("--") && word.ends_with('=')) return word;
-    if (word.empty()) return (before.starts_with("--") ? before + " " : "") + "\"\"";
+    if (word.find_first_not_of(',') == std::string::npos)
+      return (before.starts_with("--") ? before + " " : "") + '"' + word + '"';
   }
   return "";
 }

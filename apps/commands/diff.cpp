@@ -20,14 +20,15 @@ struct Options {
 int run(const Options& options) {
   const MapDifference d = difference(load_map(options.a), load_map(options.b));
   const bool differs = beyond(d, options.tolerance);
+  const bool same_texts = d.settings.empty() && d.undone_only_a + d.undone_only_b == 0;
   if (options.common.json) {
     std::printf("%s\n", to_json(d, options.a, options.b, options.tolerance).c_str());
   } else if (!options.common.quiet) {
     std::printf("%s%s\n", to_text(d).c_str(),
-                differs              ? "different"
-                : !d.same_hash       ? "equal within tolerance"
-                : d.settings.empty() ? "identical"
-                                     : "identical values");
+                differs        ? "different"
+                : !d.same_hash ? "equal within tolerance"
+                : same_texts   ? "identical"
+                               : "identical values");
   }
   return differs ? kDifferent : kDone;
 }

@@ -61,7 +61,10 @@ void check(const ExportOptions& o) {
   // A whole map may be written anew in its place (--compact); a part, or a picture of it, would be all that is left.
   const bool whole = o.class_name.empty() && o.box_m.empty() && o.segment_at.empty() && !o.half && o.grids.empty();
   std::map<fs::path, std::string> uses = {{fs::weakly_canonical(o.map), "the map that is read"}};
-  if (whole && !o.vdb.empty() && fs::weakly_canonical(o.vdb) == fs::weakly_canonical(o.map)) uses.clear();
+  for (const fs::path& other : {fs::path(o.properties), fs::path(o.segment.mask)})
+    if (!other.empty()) uses.emplace(fs::weakly_canonical(other), "a file that is read");
+  if (whole && !o.vdb.empty() && fs::weakly_canonical(o.vdb) == fs::weakly_canonical(o.map))
+    uses.erase(fs::weakly_canonical(o.map));
   for (const auto& [option, file] :
        {std::pair("--vdb", o.vdb), {"--mesh", o.mesh}, {"--points", o.points}, {"--html", o.html}})
     if (!file.empty())
@@ -239,6 +242,7 @@ void add_export(CLI::App& app) {
   command.add_option("--vdb", o->vdb, "Map file of the part; with --grids or --half a file of grids for viewing");
   command.add_option("--grids", o->grids, "Grids to write, by name; evidence/ stands for all that begin so")
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->option_text("NAME,...");
   command.add_flag("--half", o->half, "Store floats in 16 bits, but for grids that these cannot hold");
   command.add_flag("--compact", o->compact, "A map file of least size: DEFLATE, and no grids that only viewers need");
@@ -251,6 +255,7 @@ void add_export(CLI::App& app) {
   command.add_option("--box", o->box_m, "Only what lies in x0,y0,z0,x1,y1,z1, metres")
       ->delimiter(',')
       ->expected(6)
+      ->allow_extra_args(false)
       ->group(part);
   CLI::Option* segment_at = command.add_option("--segment-at", o->segment_at,
                                                "Only the region that a touch at x,y,z would update (options as there)");

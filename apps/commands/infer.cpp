@@ -116,6 +116,7 @@ void add_infer(CLI::App& app) {
                   "Least and largest value of the property in --properties-out: 0,inf for friction [all numbers]")
       ->delimiter(',')
       ->expected(2)
+      ->allow_extra_args(false)
       ->needs("--properties-out");
   command.add_flag("--force", options->overwrite, "Replace --properties-out where it exists")
       ->needs("--properties-out");

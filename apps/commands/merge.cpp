@@ -35,8 +35,6 @@ struct Options {
   bool overwrite = false;
 };
 
-bool has_evidence(const Map& map) { return std::ranges::any_of(map.store.blocks(), &Block::has_evidence); }
-
 /// The cap that was given, else the one that all maps were made with which hold what it caps, else `usual`.
 float cap(const std::optional<float>& given, const std::vector<Map>& maps, const std::function<bool(const Map&)>& holds,
           const char* key, const char* what, const char* option, float usual) {
@@ -66,13 +64,16 @@ void warn_of_redone_touches(const std::vector<Map>& maps, const Map& result) {
 
 /// The settings of two runs may be the same where the recording's own files were mended in between.
 void warn_of_different_readings(const std::vector<Map>& maps) {
-  std::vector<RecordingAsRead> recordings;
-  for (const Map& map : maps) recordings.push_back(recording_of(map));
+  std::vector<std::vector<RecordingAsRead>> recordings;
+  for (const Map& map : maps) recordings.push_back(recordings_of(map));
   for (size_t i = 0; i < maps.size(); ++i)
     for (size_t j = 0; j < i; ++j) {
-      if (recordings[j].content != recordings[i].content) continue;
-      if (const std::vector<std::string> names = differences(recordings[j].reading, recordings[i].reading);
-          !names.empty())
+      std::set<std::string> names;
+      for (const RecordingAsRead& a : recordings[j])
+        for (const RecordingAsRead& b : recordings[i])
+          if (a.content == b.content)
+            std::ranges::copy(differences(a.reading, b.reading), inserter(names, names.end()));
+      if (!names.empty())
         spdlog::warn(
             "maps {} and {} are of one recording that was understood in two ways ({}): what is added up was not "
             "measured alike",
@@ -97,11 +98,14 @@ void warn_of_what_does_not_add(const std::vector<Map>& maps, const MergeOptions&
     spdlog::warn(
         "maps made with --label-novelty or --label-turn: viewpoints that only another map saw count as new ones, so "
         "that class evidence is more than that of one run");
-  for (size_t i = 0; i < maps.size() && !merging.allow_shared_frames; ++i)
-    for (size_t j = 0; j < i; ++j)
-      if (const size_t frames = frames_of_same_images(maps[j].frames, maps[i].frames); frames > 0)
-        spdlog::warn("maps {} and {} hold the same images with other poses or stamps: {} frames count twice", j + 1,
-                     i + 1, frames);
+  for (size_t i = 0; i < maps.size(); ++i)
+    for (size_t j = 0; j < i; ++j) {
+      if (!of_same_images_elsewhere(maps[j].frames, maps[i].frames)) continue;
+      const size_t frames = merging.allow_shared_frames ? 0 : frames_of_same_images(maps[j].frames, maps[i].frames);
+      spdlog::warn("maps {} and {} hold the same images with other poses or stamps: {}", j + 1, i + 1,
+                   frames > 0 ? std::to_string(frames) + " frames count twice"
+                              : "what is added up was not measured in one world frame");
+    }
 }
 
 int run(const Options& options) {

@@ -327,7 +327,7 @@ void add_touch(CLI::App& app) {
                                              "Recording that --frame, or rows of --file with u and v, speak of");
   CLI::Option* pixel = command.add_option("--pixel", options->pixel,
                                           "u,v of the touch; with --region mask its region is the segment there");
-  pixel->delimiter(',')->expected(2)->check(finite())->needs(frame);
+  pixel->delimiter(',')->expected(2)->allow_extra_args(false)->check(finite())->needs(frame);
   CLI::Option* masks =
       command.add_option("--masks", options->masks, "Folder of instance images or masks to take that segment from");
   masks->needs(sequence);

@@ -9,6 +9,7 @@
 #include "io/files/json_number.h"
 #include "io/files/json_text.h"
 #include "io/map_file/map_file.h"
+#include "mapping/maps/merge.h"
 
 namespace felt::apps {
 namespace {
@@ -18,6 +19,7 @@ using nlohmann::json;
 // Keys of Map::metadata.
 constexpr const char* kConfig = "config";
 constexpr const char* kProgress = "progress";
+constexpr const char* kRecording = "recording";
 
 /// Twelve numbers a pose, row by row: JSON keeps every bit of them.
 json poses_json(const std::vector<Eigen::Isometry3d>& poses) {
@@ -41,12 +43,10 @@ std::vector<Eigen::Isometry3d> poses_of(const json& rows) {
 }
 
 json progress_of(const FusionRecord& record, const std::vector<Eigen::Isometry3d>& viewpoints, bool complete,
-                 const std::string& touches, const SequenceInfo& sequence) {
+                 const std::string& touches) {
   json unknown = json::array();
   for (const auto& [id, pixels] : record.unknown_ids) unknown.push_back({id, pixels});
-  return {{"recording", sequence.content},
-          {"reading", sequence.reading},
-          {"complete", complete},
+  return {{"complete", complete},
           {"read", record.read},
           {"fused", record.fused},
           {"skipped", record.skipped},
@@ -97,14 +97,17 @@ void read_progress(const json& progress, const std::string& where, Checkpoint& c
   }
 }
 
-/// Empty where the progress does not say, as that of maps of earlier versions.
-RecordingAsRead recording_of(const json& progress) {
+json recording_json(const SequenceInfo& sequence) {
+  return {{"recording", sequence.content}, {"reading", sequence.reading}};
+}
+
+RecordingAsRead recording_from(const json& text) {
   RecordingAsRead recording;
-  if (const auto content = progress.find("recording"); content != progress.end() && content->is_string())
+  if (const auto content = text.find("recording"); content != text.end() && content->is_string())
     recording.content = *content;
-  const json reading = progress.value("reading", json::object());
-  for (const auto& [name, text] : reading.items())
-    if (text.is_string()) recording.reading[name] = text;
+  const json reading = text.value("reading", json::object());
+  for (const auto& [name, said] : reading.items())
+    if (said.is_string()) recording.reading[name] = said;
   return recording;
 }
 
@@ -165,7 +168,8 @@ void require_same_run(const json& were, const json& are, const std::string& wher
 
 std::string fusion_settings(const nlohmann::ordered_json& config) {
   nlohmann::ordered_json shaping = config;
-  for (const char* key : {"sequence", "frames", "labels", "probs", "classes", "properties", "touches", "confusion"})
+  for (const char* key :
+       {"sequence", "frames", "labels", "probs", "classes", "properties", "touches", "no_touches", "confusion"})
     shaping.erase(key);
   if (shaping.contains("perception"))
     for (const char* key : {"segmenter", "masks"}) shaping["perception"].erase(key);
@@ -176,14 +180,19 @@ std::string save_checkpoint(Map& map, const FusionRecord& record, const std::vec
                             bool complete, const std::string& touches, const SequenceInfo& sequence,
                             const nlohmann::ordered_json& config, const std::filesystem::path& path) {
   map.metadata[kConfig] = json_text(config);
-  map.metadata[kProgress] = json_text(progress_of(record, viewpoints, complete, touches, sequence));
+  map.metadata[kProgress] = json_text(progress_of(record, viewpoints, complete, touches));
+  map.metadata[kRecording] = json_text(recording_json(sequence));
   // On the way nobody looks at views, and they take longer than the rest.
   return save_map(map, path, {.views = complete || !record.stopped.empty()});
 }
 
-RecordingAsRead recording_of(const Map& map) {
-  const json progress = text_of(map, kProgress);
-  return progress.is_object() ? recording_of(progress) : RecordingAsRead();
+std::vector<RecordingAsRead> recordings_of(const Map& map) {
+  std::vector<RecordingAsRead> recordings;
+  for (const auto& [key, text] : map.metadata)
+    if (without_number(key) == kRecording)
+      if (const json parsed = json::parse(text, nullptr, false); parsed.is_object())
+        recordings.push_back(recording_from(parsed));
+  return recordings;
 }
 
 std::vector<std::string> differences(const Reading& a, const Reading& b) {
@@ -201,7 +210,8 @@ std::optional<Checkpoint> resume(const std::filesystem::path& path, const Sequen
   Map map = load_map(path);
   const std::string where = path.string();
   const json progress = required_text_of(map, kProgress, where);
-  const RecordingAsRead recording = recording_of(progress);
+  const json said = text_of(map, kRecording);  // earlier maps say it beside their progress
+  const RecordingAsRead recording = recording_from(said.is_object() ? said : progress);
   const json config_then = required_text_of(map, kConfig, where), config_now = json::parse(json_text(config));
   if (!frames_differ_by_settings(config_then, config_now)) require_same_recording(recording, map, sequence, where);
   require_same_run(config_then, config_now, where);

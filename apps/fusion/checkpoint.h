@@ -33,16 +33,17 @@ using Reading = std::map<std::string, std::string>;  ///< SequenceInfo::reading
 
 /// The recording of a map's run, and how it was understood then.
 struct RecordingAsRead {
-  std::string content;  ///< SequenceInfo::content; empty where that is not known, as of merged maps
+  std::string content;  ///< SequenceInfo::content
   Reading reading;
 };
 
-RecordingAsRead recording_of(const Map& map);
+/// One, or those of all maps that a map was merged of; none where the map does not say.
+std::vector<RecordingAsRead> recordings_of(const Map& map);
 
 /// Names of what both readings say, and say differently: camera, depth scale, label images, ...
 std::vector<std::string> differences(const Reading& a, const Reading& b);
 
-/// Of a part of a map: no run can go on with it.
+/// Of a part of a map, or of a merged one: no run can go on with it.
 void forget_progress(Map& map);
 
 /// Where an earlier run ended.

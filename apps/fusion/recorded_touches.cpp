@@ -51,6 +51,7 @@ TouchPlan plan_touches(const ReconstructOptions& options, const SequenceReader& 
   TouchPlan plan;
   if (const auto& file = options.properties.empty() ? info.properties_file : options.properties; !file.empty())
     plan.properties = read_properties(file), warn_of_misspelt_priors(plan.properties, classes, file.string());
+  if (options.no_touches) return plan;
   const bool named = !options.touches.empty();
   plan.file = named ? options.touches : info.touches_file;
   if (plan.file.empty()) return plan;

@@ -50,6 +50,7 @@ void add_label_options(CLI::App& command, LabelSettings& s) {
       .add_option("--ignore-classes", s.ignore_classes,
                   "Names, such as person: their pixels neither label nor build surface")
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->group(group);
   add_switch(command, "--instances", s.instances, "Keep the instance id of every voxel")->group(group);
 }

@@ -73,7 +73,13 @@ void add_reconstruct_options(CLI::App& command, ReconstructArguments& a) {
 
   add_reading_options(command, a.reading);
   command.add_option("--properties", a.properties, "Property table (properties.yaml)")->group(kReadingGroup);
-  command.add_option("--touches", a.touches, "Recorded touches (touches.csv), each at its stamp or frame")
+  CLI::Option* touches =
+      command.add_option("--touches", a.touches, "Recorded touches (touches.csv), each at its stamp or frame");
+  touches->group(kReadingGroup);
+  command
+      .add_flag("--no-touches", a.no_touches,
+                "Leave out the touches that lie in the recording, as in a part whose merged map is touched later")
+      ->excludes(touches)
       ->group(kReadingGroup);
   add_label_options(command, a.label_settings);
   add_perception_options(command, a.perception, "--segmenter");
@@ -93,7 +99,8 @@ ReconstructOptions resolve(const ReconstructArguments& a, int threads) {
   configured.format = file.format.value_or("");
   configured.labels_dir = file.labels, configured.probs_dir = file.probs, configured.classes_file = file.classes;
   options.properties = a.properties.empty() ? file.properties : a.properties;
-  options.touches = a.touches.empty() ? file.touches : a.touches;
+  options.no_touches = a.no_touches;
+  if (!a.no_touches) options.touches = a.touches.empty() ? file.touches : a.touches;
   configured.intrinsics = file.intrinsics;
   configured.pose_convention = file.pose_convention;
   configured.depth_encoding = file.depth_encoding;
@@ -197,6 +204,7 @@ nlohmann::ordered_json to_json(const ReconstructOptions& options) {
   if (!reading.classes_file.empty()) json["classes"] = reading.classes_file.string();
   if (!options.properties.empty()) json["properties"] = options.properties.string();
   if (!options.touches.empty()) json["touches"] = options.touches.string();
+  if (options.no_touches) json["no_touches"] = true;
   json["max_dt_s"] = reading.max_dt_s;
   if (reading.pose_stamp_offset != 0) json["stamp_offset"] = reading.pose_stamp_offset;
   if (reading.label_offset != 0) json["label_offset"] = reading.label_offset;

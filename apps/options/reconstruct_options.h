@@ -19,6 +19,7 @@ struct ReconstructOptions {
   std::filesystem::path sequence, out;
   SequenceOptions reading;
   std::filesystem::path properties, touches;  ///< empty: what the sequence carries, if anything
+  bool no_touches = false;                    ///< not even those
   double voxel_size_m = 0.02;
   double truncation_m = 0.08;
   std::string truncation = "4vox";                         ///< as given
@@ -35,6 +36,7 @@ struct ReconstructOptions {
 /// The command line's own words. What is left empty keeps the default or the configuration file's value.
 struct ReconstructArguments {
   std::filesystem::path config, sequence, out, properties, touches;
+  bool no_touches = false;
   ReadingArguments reading;
   std::string truncation;
   std::optional<double> voxel_size_m, min_depth_m, max_depth_m, max_weight;

@@ -84,8 +84,12 @@ std::vector<CLI::Option*> RegionOptions::add_to(CLI::App& command) {
   add("--intrinsics", intrinsics, "Camera of the mask: fx,fy,cx,cy or fx,fy,cx,cy,width,height")
       ->delimiter(',')
       ->expected(4, 6)
+      ->allow_extra_args(false)
       ->option_text("FLOAT x 4 or 6");
-  add("--pose", pose, "Camera to world of the mask: 16 numbers row by row")->delimiter(',')->expected(16);
+  add("--pose", pose, "Camera to world of the mask: 16 numbers row by row")
+      ->delimiter(',')
+      ->expected(16)
+      ->allow_extra_args(false);
   return added;
 }
 

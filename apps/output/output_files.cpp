@@ -57,6 +57,19 @@ size_t evidence_missing_from(const Map& map, const Map& older) {
   return missing;
 }
 
+/// Voxels that an older map observed more often, or labelled more often, than the new one: a lower cap took that away.
+size_t voxels_of_less_weight(const Map& map, const Map& older) {
+  constexpr double kRounding = 1e-4;
+  size_t less = 0;
+  for (const Block& block : older.store.blocks()) {
+    const Block* kept = map.store.get(block.coord);
+    for (int i = 0; i < kBlockVoxels && kept != nullptr; ++i)
+      less += double(kept->geometry->weight[i]) < double(block.geometry->weight[i]) * (1 - kRounding) ||
+              total_evidence(*kept, i) < total_evidence(block, i) * (1 - kRounding);
+  }
+  return less;
+}
+
 /// Touches that count in an older map and not in the new one.
 struct MissingTouches {
   size_t unknown = 0;  ///< to the new one
@@ -76,7 +89,8 @@ MissingTouches touches_missing_from(const TouchJournal& journal, const TouchJour
 
 /// What an older map holds that the new one does not, in words; empty where there is nothing.
 std::string missing_from(const Map& map, const Map& older, LostTouches touches) {
-  if (older.voxel_size_m != map.voxel_size_m) return "a map of " + std::to_string(older.voxel_size_m) + " m voxels";
+  if (older.voxel_size_m != map.voxel_size_m)
+    return "a map of " + number_text(older.voxel_size_m, "%.15g") + " m voxels";
   if (!older.classes.empty() && !(older.classes == map.classes)) return "a map of other classes";
   if (!continues(map.properties, older.properties)) return "a map of other properties";
   if (older.frames.runs.empty() && !map.frames.runs.empty()) return "a map that does not say of what it was made";
@@ -95,6 +109,9 @@ std::string missing_from(const Map& map, const Map& older, LostTouches touches) 
   // Which images held the labels is not in the journal.
   if (const size_t labels = evidence_missing_from(map, older); labels > 0)
     return "a map with class evidence that the new one does not hold (" + std::to_string(labels) + " counts)";
+  if (const size_t voxels = voxels_of_less_weight(map, older); voxels > 0)
+    return "a map with " + std::to_string(voxels) +
+           " voxels of more weight or class evidence than in the new one (--max-weight and --label-cap of merge)";
   return "";
 }
 

@@ -19,7 +19,7 @@ std::string to_json(const MapDifference& difference, const std::string& a, const
                         {"voxels_changed", c.voxels_changed},
                         {"max_difference", number(c.max_difference)},
                         {"mean_difference", number(c.mean_difference)}};
-  const nlohmann::json report = {
+  nlohmann::json report = {
       {"a", a},
       {"b", b},
       {"tolerance", tolerance},
@@ -35,8 +35,12 @@ std::string to_json(const MapDifference& difference, const std::string& a, const
        {{"only_a", difference.touches_only_a},
         {"only_b", difference.touches_only_b},
         {"both", difference.touches_both},
+        {"undone_only_a", difference.undone_only_a},
+        {"undone_only_b", difference.undone_only_b},
         {"regions_changed", difference.regions_changed},
         {"region_voxels_changed", difference.region_voxels_changed}}}};
+  if (!difference.comparable)  // nothing was counted
+    for (const char* key : {"blocks", "channels", "class_flips", "touches", "same_hash"}) report[key] = nullptr;
   return json_text(report, 2);
 }
 
@@ -57,6 +61,9 @@ std::string to_text(const MapDifference& difference) {
     text += line + (c.unit.empty() ? "" : " " + c.unit) + "\n";
   }
   text += "class flips: " + std::to_string(difference.class_flips) + "\n";
+  if (difference.undone_only_a + difference.undone_only_b > 0)
+    text += "undone touches: " + std::to_string(difference.undone_only_a) + " only in A, " +
+            std::to_string(difference.undone_only_b) + " only in B\n";
   const size_t touches = difference.touches_only_a + difference.touches_only_b + difference.touches_both;
   if (touches == 0) return text;
   std::snprintf(line, sizeof line,

@@ -52,7 +52,10 @@ std::string attribute_name(const std::string& scalar) {
 }
 
 /// One number per vertex. glTF allows only finite ones: others are written as 0, and an attribute more says where.
-void add_scalars(const std::string& name, std::vector<float> values, Buffers& buffers, json& attributes) {
+/// Two names that glTF's letters make one are numbered: the later one gets "_2" behind it.
+void add_scalars(const std::string& wanted, std::vector<float> values, Buffers& buffers, json& attributes) {
+  std::string name = wanted;
+  for (int number = 2; attributes.contains(name); ++number) name = wanted + "_" + std::to_string(number);
   std::vector<float> known(values.size(), 1.0f);
   bool all_known = true;
   for (size_t i = 0; i < values.size(); ++i)

@@ -251,7 +251,9 @@ void write_html(const std::filesystem::path& path, const TriangleMesh& mesh, con
   static_assert(sizeof(Triangle) == 12);
   AtomicFile file(path);
   file.write(kHead);
-  file.write("<title>" + escaped(title) + "</title>\n</head>\n<body>\n");
+  // As JSON has it: without bytes that are no UTF-8.
+  file.write("<title>" + escaped(nlohmann::json::parse(json_text(nlohmann::json(title))).get<std::string>()) +
+             "</title>\n</head>\n<body>\n");
   file.write(data_element("scene", "application/json", embedded(scene)));
   file.write(data_element("positions", positions));
   file.write(data_element("normals", normals));

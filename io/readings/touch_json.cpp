@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "core/text.h"
 #include "io/files/json_number.h"
 
 namespace felt {
@@ -61,22 +62,24 @@ Eigen::Vector3d point_from(const json& j) {
 
 json to_json(const Touch& t) {
   const TouchRequest& r = t.request;
-  return {{"id", id_text(t.id)},
-          {"stamp_s", r.stamp_s},
-          {"point_m", point(r.point_m)},
-          {"property", r.property},
-          {"value", r.value},
-          {"sigma", r.sigma},
-          {"model", model_name(r.model)},
-          {"projection", projection_name(r.projection)},
-          {"rho", finite(r.rho)},
-          {"region", to_json(r.region)},
-          {"voxel", {t.voxel.x, t.voxel.y, t.voxel.z}},
-          {"surface_m", point(t.surface_m)},
-          {"undone", t.undone},
-          {"before", to_json(t.before)},
-          {"after", to_json(t.after)},
-          {"refused_voxels", t.refused_voxels}};
+  json out = {{"id", id_text(t.id)},
+              {"stamp_s", r.stamp_s},
+              {"point_m", point(r.point_m)},
+              {"property", r.property},
+              {"value", r.value},
+              {"sigma", r.sigma},
+              {"model", model_name(r.model)},
+              {"projection", projection_name(r.projection)},
+              {"rho", finite(r.rho)},
+              {"region", to_json(r.region)},
+              {"voxel", {t.voxel.x, t.voxel.y, t.voxel.z}},
+              {"surface_m", point(t.surface_m)},
+              {"undone", t.undone},
+              {"before", to_json(t.before)},
+              {"after", to_json(t.after)},
+              {"refused_voxels", t.refused_voxels}};
+  if (r.view != 0) out["view"] = hexadecimal(r.view);
+  return out;
 }
 
 Touch touch_from(const json& j) {
@@ -91,6 +94,7 @@ Touch touch_from(const json& j) {
   t.request.projection = projection_of_name(j.at("projection").get<std::string>());
   t.request.rho = number(j.at("rho"), kNan);
   t.request.region = settings_from(j.at("region"));
+  if (j.contains("view")) t.request.view = id_of_text(j.at("view").get<std::string>());
   t.voxel = {whole_number<int32_t>(j.at("voxel").at(0)), whole_number<int32_t>(j.at("voxel").at(1)),
              whole_number<int32_t>(j.at("voxel").at(2))};
   t.surface_m = point_from(j.at("surface_m"));

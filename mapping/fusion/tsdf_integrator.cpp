@@ -37,17 +37,23 @@ const float* tangent_scale(const Frame& frame, const IntegrationConfig& config, 
 /// Depth 0 means that nothing was measured, also where no least depth is asked for.
 float least_usable_m(float min_depth_m) { return std::max(min_depth_m, std::numeric_limits<float>::min()); }
 
-/// Finds or creates the blocks, with the planes that this frame writes: the only serial step.
+/// Finds or creates the blocks, with the planes that this frame writes: the only serial step. A block that was never
+/// observed is as if it had not been allocated before, since saved maps do not hold it.
 void allocate_blocks(Map& map, const std::vector<BlockCoord>& coords, bool with_color, std::vector<uint32_t>& blocks) {
   blocks.clear();
   blocks.reserve(coords.size());
   for (const BlockCoord& coord : coords) {
     blocks.push_back(map.store.find_or_create(coord));
-    if (with_color) map.store.add_color(map.store[blocks.back()]);
+    Block& block = map.store[blocks.back()];
+    if (with_color)
+      map.store.add_color(block);
+    else if (block.color != nullptr && !block.geometry->observed())
+      block.color = nullptr;
   }
 }
 
-/// Carving reaches what the map has in the free space before this frame's surfaces, besides the blocks around them.
+/// Carving reaches what the map has in the free space before this frame's surfaces, besides the blocks around them. A
+/// block that was never observed is as if it were not there, as above.
 void add_blocks_in_front(const Map& map, const Eigen::Isometry3d& T_world_camera, const DepthView& view,
                          std::vector<BlockCoord>& coords, std::vector<uint32_t>& blocks) {
   std::vector<bool> taken(map.store.size());
@@ -60,8 +66,10 @@ void add_blocks_in_front(const Map& map, const Eigen::Isometry3d& T_world_camera
     return (T_camera_world * (map.voxel_size_m * centre)).z() < -radius_m;
   };
   for (uint32_t n = 0; n < map.store.size(); ++n) {
-    if (taken[n] || behind(map.store[n].coord) || cubes_in_band(map.store[n].coord, view) == 0) continue;
-    coords.push_back(map.store[n].coord);
+    const Block& block = map.store[n];
+    if (taken[n] || behind(block.coord) || cubes_in_band(block.coord, view) == 0 || !block.geometry->observed())
+      continue;
+    coords.push_back(block.coord);
     blocks.push_back(n);
   }
 }

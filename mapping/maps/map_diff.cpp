@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "core/text.h"
 #include "mapping/labels/class_belief.h"
 #include "mapping/maps/table_difference.h"
 #include "mapping/touch/touch_view.h"
@@ -59,7 +60,7 @@ std::set<BlockCoord> observed_coordinates(const Map& a, const Map& b) {
 std::vector<std::string> different_settings(const Map& a, const Map& b) {
   std::vector<std::string> lines;
   const auto compare = [&](const char* what, double x, double y) {
-    if (x != y) lines.push_back(std::string(what) + ": " + std::to_string(x) + " and " + std::to_string(y));
+    if (x != y) lines.push_back(std::string(what) + ": " + number_text(x, "%.15g") + " and " + number_text(y, "%.15g"));
   };
   compare("voxel_size_m", a.voxel_size_m, b.voxel_size_m);
   compare("truncation_m", a.truncation_m, b.truncation_m);
@@ -182,8 +183,12 @@ void compare_touched(const Block* a, const Block* b, Channels::Touched& channel)
 
 void compare_journals(const TouchJournal& a, const TouchJournal& b, MapDifference& result) {
   const auto active = [](const Touch* touch) { return touch != nullptr && !touch->undone; };
-  for (const Touch& touch : b.touches) result.touches_only_b += active(&touch) && !active(a.find(touch.id));
+  for (const Touch& touch : b.touches) {
+    result.touches_only_b += active(&touch) && !active(a.find(touch.id));
+    result.undone_only_b += touch.undone && a.find(touch.id) == nullptr;
+  }
   for (const Touch& touch : a.touches) {
+    result.undone_only_a += touch.undone && b.find(touch.id) == nullptr;
     if (!active(&touch)) continue;
     const Touch* other = b.find(touch.id);
     if (!active(other)) {

@@ -32,6 +32,8 @@ struct MapDifference {
   size_t class_flips = 0;
   /// Active touches, by id.
   size_t touches_only_a = 0, touches_only_b = 0, touches_both = 0;
+  /// Touches that one journal keeps for `redo` and the other does not know: no difference of any value.
+  size_t undone_only_a = 0, undone_only_b = 0;
   size_t regions_changed = 0;        ///< touches of both maps whose regions are not the same voxels
   size_t region_voxels_changed = 0;  ///< voxels that are in one of such two regions only
 };

@@ -168,14 +168,6 @@ void merge_instances(std::span<const Block* const> from, InstancePlanes& to) {
   }
 }
 
-/// "config" of "config 2", a key that an earlier merge numbered.
-std::string without_number(const std::string& key) {
-  const size_t space = key.find_last_of(' ');
-  const bool numbered = space != std::string::npos && space + 1 < key.size() &&
-                        key.find_first_not_of("0123456789", space + 1) == std::string::npos;
-  return numbered ? key.substr(0, space) : key;
-}
-
 /// Texts that all maps agree on keep their key; of others every distinct text is kept, numbered in ascending order.
 std::map<std::string, std::string> joined_texts(std::span<const Map* const> maps) {
   std::map<std::string, std::set<std::string>> texts;
@@ -191,6 +183,13 @@ std::map<std::string, std::string> joined_texts(std::span<const Map* const> maps
 }
 
 }  // namespace
+
+std::string without_number(const std::string& key) {
+  const size_t space = key.find_last_of(' ');
+  const bool numbered = space != std::string::npos && space + 1 < key.size() &&
+                        key.find_first_not_of("0123456789", space + 1) == std::string::npos;
+  return numbered ? key.substr(0, space) : key;
+}
 
 Map merge(std::span<const Map* const> maps, const MergeOptions& options) {
   if (maps.empty()) throw ConfigError("merge: expected at least one map, found none");

@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <span>
+#include <string>
 
 #include "mapping/map.h"
 
@@ -24,5 +25,8 @@ struct MergeOptions {
 /// arguments. A property table may continue another: the result has the longest. Throws ConfigError naming every reason
 /// why the maps do not go together: voxel size, truncation, class table, property table, shared frames.
 Map merge(std::span<const Map* const> maps, const MergeOptions& options = {});
+
+/// Key of a map's text as the single map had it: "config" of "config 2", which merging numbered.
+std::string without_number(const std::string& key);
 
 }  // namespace felt

@@ -15,4 +15,7 @@ struct ViewMask {
   Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();
 };
 
+/// Tells views apart: a hash of the mask, its camera and its pose; never 0.
+uint64_t digest(const ViewMask& view);
+
 }  // namespace felt

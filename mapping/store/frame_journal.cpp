@@ -7,6 +7,17 @@
 #include <utility>
 
 namespace felt {
+namespace {
+
+/// The first half of a recording's name.
+std::string images_of(const FusedFrames& run) { return run.sequence.substr(0, 16); }
+
+/// One recording that was read with other poses or stamps.
+bool same_images_elsewhere(const FusedFrames& a, const FusedFrames& b) {
+  return a.sequence != b.sequence && images_of(a) == images_of(b);
+}
+
+}  // namespace
 
 void record_frame(FrameJournal& journal, const std::string& sequence, const std::string& settings, int64_t index) {
   if (journal.runs.empty() || journal.runs.back().sequence != sequence || journal.runs.back().settings != settings)
@@ -34,16 +45,22 @@ std::vector<std::pair<std::string, int64_t>> shared_frames(const FrameJournal& a
 }
 
 size_t frames_of_same_images(const FrameJournal& a, const FrameJournal& b) {
-  const auto images = [](const FusedFrames& run) { return run.sequence.substr(0, 16); };
   std::set<std::pair<std::string, int64_t>> frames;
   for (const FusedFrames& run_a : a.runs)
     for (const FusedFrames& run_b : b.runs) {
-      if (run_a.sequence == run_b.sequence || images(run_a) != images(run_b)) continue;
+      if (!same_images_elsewhere(run_a, run_b)) continue;
       const std::set<int64_t> in_a(run_a.frames.begin(), run_a.frames.end());
       for (const int64_t index : run_b.frames)
-        if (in_a.contains(index)) frames.emplace(images(run_a), index);
+        if (in_a.contains(index)) frames.emplace(images_of(run_a), index);
     }
   return frames.size();
+}
+
+bool of_same_images_elsewhere(const FrameJournal& a, const FrameJournal& b) {
+  return std::any_of(a.runs.begin(), a.runs.end(), [&](const FusedFrames& run_a) {
+    return std::any_of(b.runs.begin(), b.runs.end(),
+                       [&](const FusedFrames& run_b) { return same_images_elsewhere(run_a, run_b); });
+  });
 }
 
 FrameJournal joined(const FrameJournal& a, const FrameJournal& b) {

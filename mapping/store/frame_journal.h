@@ -37,6 +37,9 @@ std::vector<std::pair<std::string, int64_t>> shared_frames(const FrameJournal& a
 /// read with other poses or stamps.
 size_t frames_of_same_images(const FrameJournal& a, const FrameJournal& b);
 
+/// Whether each has a run of the same images that the other took at other places or times.
+bool of_same_images_elsewhere(const FrameJournal& a, const FrameJournal& b);
+
 /// Both journals in one, in an order that does not depend on which came first: runs by sequence and settings, joined
 /// where both are equal, frames ascending.
 FrameJournal joined(const FrameJournal& a, const FrameJournal& b);

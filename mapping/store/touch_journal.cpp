@@ -44,6 +44,7 @@ public:
           << uint64_t(r.model) << uint64_t(r.projection);
     // Every NaN means the same.
     *this << (r.rho != r.rho ? -1.0 : r.rho);
+    if (r.view != 0) *this << r.view;
     return *this << uint64_t(s.rule) << s.band_voxels << s.min_weight << s.snap_voxels << s.class_ratio
                  << s.normal_change_deg << s.color_change << s.radius_m;
   }

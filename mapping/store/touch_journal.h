@@ -32,6 +32,7 @@ struct TouchRequest {
   Projection projection = Projection::kl;
   double rho = std::numeric_limits<double>::quiet_NaN();  ///< NaN: the property's own
   RegionSettings region;
+  uint64_t view = 0;  ///< rule `mask`: digest of the mask and its camera, which `resolve_touch` fills in; else 0
 };
 
 /// Belief about a region at one moment, for the report of a touch. NaN where a number does not exist.
@@ -64,8 +65,8 @@ struct TouchJournal {
   bool any_active() const;
 };
 
-/// Inserts in canonical order. The id is a hash of the request, so that it does not depend on the order of arrival;
-/// a request that came before gets the next free number. Returns the id.
+/// Inserts in canonical order. The id is a hash of the request (with `view`), so that it does not depend on the order
+/// of arrival; a request that came before gets the next free number. Returns the id.
 uint64_t insert(TouchJournal& journal, Touch touch);
 
 /// The touches of both journals, whichever comes first: a touch that both hold once, with both regions, and undone only

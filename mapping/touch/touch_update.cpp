@@ -133,6 +133,7 @@ Touch resolve_touch(const Map& map, const TouchRequest& request, const ViewMask*
   const Contact contact = find_contact(map, request.point_m, request.region);
   Touch touch;
   touch.request = request;
+  if (request.region.rule == RegionRule::mask) touch.request.view = digest(*view);
   touch.voxel = contact.voxel;
   touch.surface_m = contact.surface_m;
   touch.region = request.region.rule == RegionRule::mask ? find_region(map, *view, request.region, &contact)

@@ -304,6 +304,9 @@ TEST_CASE("merging warns of the same images with other poses, and of what does n
   CHECK_THAT(merged(even + odd), !Catch::Matchers::Contains("warning"));
   CHECK_THAT(merged(even + part(moved, "moved_map", "--frames 0::3")),
              Catch::Matchers::Contains("same images") && Catch::Matchers::Contains("2 frames count twice"));
+  CHECK_THAT(merged(even + part(moved, "moved_odd", "--frames 1::2")),
+             Catch::Matchers::Contains("maps 1 and 2 hold the same images with other poses or stamps: what is added up "
+                                       "was not measured in one world frame"));
   CHECK_THAT(merged(even + part(boxes(), "squares", "--frames 1::2 --weight inverse-square --max-depth 3")),
              Catch::Matchers::Contains("weight: \"constant\" and \"inverse-square\"") &&
                  Catch::Matchers::Contains("max_depth_m: 3.0 and 4.0"));

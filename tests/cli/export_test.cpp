@@ -10,6 +10,7 @@
 #include <set>
 #include <sstream>
 
+#include "core/utf8.h"
 #include "io/map_file/map_file.h"
 #include "io/meshes/mesh_io.h"
 #include "mapping/touch/touch_update.h"
@@ -324,6 +325,25 @@ TEST_CASE("a part with voxels and without a surface is written empty, and a warn
   CHECK_THAT(run_feltmap("export --force " + quoted(floor.map) + " --mesh " + quoted(ply)).err, !Contains("empty"));
 }
 
+TEST_CASE("an option of several numbers ends where they end, and a list of nothing is none") {
+  const TouchedFloor floor;
+  const fs::path ply = floor.directory.path() / "part.ply", vdb = floor.directory.path() / "part.vdb";
+  const auto code = [](const std::string& arguments) { return run_feltmap(arguments).exit_code; };
+  CHECK(code("export --mesh " + quoted(ply) + " --box -0.1,-0.1,-0.1,0.1,0.1,0.1 " + quoted(floor.map) + " --quiet") ==
+        0);
+  CHECK(code("export --vdb " + quoted(vdb) + " --grids tsdf,weight " + quoted(floor.map) + " --quiet") == 0);
+  CHECK(code("export --force --mesh " + quoted(ply) + " --box 1,2,3 " + quoted(floor.map)) == 2);
+  CHECK(code("export " + quoted(floor.map) + " --vdb " + quoted(vdb) + " --grids , --force") == 2);
+}
+
+TEST_CASE("a page of a map whose name is no UTF-8 is UTF-8") {
+  const TouchedFloor floor;
+  const fs::path map = floor.directory.path() / "\xff.vdb", page = floor.directory.path() / "page.html";
+  fs::copy_file(floor.map, map);
+  REQUIRE(run_feltmap("export " + quoted(map) + " --html " + quoted(page)).exit_code == 0);
+  CHECK(is_utf8(file_text(page)));
+}
+
 TEST_CASE("a box that is thinner than a voxel holds the vertices within it") {
   const TouchedFloor floor;
   const fs::path all = floor.directory.path() / "all.ply", thin = floor.directory.path() / "thin.ply";
@@ -353,6 +373,12 @@ TEST_CASE("an export that cannot be finished is refused before it writes anythin
   refused(" --mesh " + quoted(ply) + " --html " + quoted(folder / "nowhere" / "out.html"), 4);
   refused(" --mesh not_written.ply --points ./not_written.ply", 3);
   CHECK_FALSE(fs::exists("not_written.ply"));
+  // Nor does it replace what it reads.
+  const fs::path table = folder / "table.yaml";
+  std::ofstream(table) << "friction: {priors: {wood: {mean: 0.4, sd: 0.05}}}\n";
+  const std::string before = file_text(table);
+  refused(" --force --html " + quoted(table) + " --properties " + quoted(table), 3);
+  CHECK(file_text(table) == before);
   // Nor does it pass over what would do nothing.
   refused(" --vdb " + quoted(vdb) + " --color-by class", 2);
   refused(" --mesh " + quoted(ply) + " --up -y", 2);

@@ -118,6 +118,11 @@ TEST_CASE("diff exits with 0 for equal maps and with 1 beyond the tolerance, and
   CHECK(run_feltmap("diff --tol 0.08 " + maps.a + " " + maps.b).exit_code == 0);
   CHECK_THAT(run_feltmap("diff " + maps.a + " " + maps.b).out, Contains("tsdf") && Contains("class flips: 0"));
   CHECK(run_feltmap("diff " + maps.a).exit_code == 2);
+  save_map(Map(0.021, 0.08), maps.out);
+  const CommandResult other_voxels = run_feltmap("diff --json " + maps.a + " " + maps.out);
+  CHECK(other_voxels.exit_code == 1);
+  for (const char* uncounted : {"blocks", "channels", "class_flips", "touches"})
+    CHECK(nlohmann::json::parse(other_voxels.out).at(uncounted).is_null());
 }
 
 TEST_CASE("merge writes one map, whatever the order of its arguments, and refuses shared frames") {

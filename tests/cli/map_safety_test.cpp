@@ -122,6 +122,29 @@ TEST_CASE("a touched copy and a merged map replace only what they hold") {
           "a map where 1 touches count that are undone in the new one");
 }
 
+TEST_CASE("a map does not grow in place under a cap that takes away what it holds") {
+  const TemporaryDirectory folder;
+  const auto part = [&](const char* frames) {
+    const fs::path out = folder.path() / frames;
+    REQUIRE(run_feltmap("reconstruct " + quoted(boxes()) + " --voxel-size 0.1 --max-weight 2 --label-cap 2 --quiet " +
+                        "--frames " + frames + " --out " + quoted(out))
+                .exit_code == 0);
+    return quoted(out / "map.vdb") + " ";
+  };
+  const fs::path all = folder.path() / "all.vdb";
+  const std::string uncapped = " --max-weight 255 --label-cap 0", last = part("8:12"),
+                    grow = "merge " + quoted(all) + " " + last + "--out " + quoted(all);
+  REQUIRE(run_feltmap("merge " + part("0:4") + part("4:8") + "--out " + quoted(all) + uncapped).exit_code == 0);
+  const std::string before = file_text(all);
+  const std::string reason =
+      "voxels of more weight or class evidence than in the new one (--max-weight and --label-cap";
+  refused(grow, 4, reason);
+  refused(grow + " --max-weight 255", 4, reason);
+  refused(grow + " --label-cap 0", 4, reason);
+  CHECK(file_text(all) == before);
+  CHECK(run_feltmap(grow + uncapped).exit_code == 0);
+}
+
 TEST_CASE("an output that names a folder is refused at once, however the folder is spelled") {
   const Recording recording;
   REQUIRE(recording.reconstruct().exit_code == 0);

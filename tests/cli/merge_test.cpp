@@ -97,6 +97,14 @@ TEST_CASE("merging says that a recording was understood in two ways") {
              "camera: {fx: 20, fy: 20, cx: 11.5, cy: 7.5, width: 24, height: 16}\ndepth_scale: 2500\n");
   CHECK_THAT(warnings_of_merge(recording, first + part(recording, "2:4", "scaled.vdb")),
              Contains("maps 1 and 2 are of one recording that was understood in two ways (depth scale)"));
+  // Maps that were merged, and parts, have not forgotten it.
+  const fs::path folder = recording.folder.path(), merged = folder / "once.vdb", cut = folder / "cut.vdb";
+  REQUIRE(run_feltmap("merge " + first + quoted(folder / "second.vdb") + " --out " + quoted(merged)).exit_code == 0);
+  REQUIRE(run_feltmap("export " + first + " --vdb " + quoted(cut) + " --box -9,-9,-9,9,9,9").exit_code == 0);
+  for (const fs::path& map : {merged, cut})
+    CHECK_THAT(
+        warnings_of_merge(recording, quoted(map) + " --allow-shared-frames " + quoted(folder / "scaled.vdb") + " "),
+        Contains("understood in two ways (depth scale)"));
 }
 
 TEST_CASE("merging says which settings of one recording's parts make their evidence unlike") {
@@ -107,10 +115,13 @@ TEST_CASE("merging says which settings of one recording's parts make their evide
     return warnings_of_merge(recording, first + part(recording, "2:4", "second.vdb", options));
   };
   CHECK_THAT(warnings(""), !Contains("warning"));
-  CHECK_THAT(warnings("--max-weight 255 --no-color"), !Contains("settings"));  // nothing is measured otherwise
+  // Nothing is measured otherwise.
+  for (const char* same : {"--max-weight 255 --no-color", "--no-color --bgr", "--depth-scale 2000", "--max-dt 0.5",
+                           "--pose-convention c2w,opencv", "--intrinsics 20,20,11.5,7.5", "--no-ray-length"})
+    CHECK_THAT(warnings(same), !Contains("warning"));
   CHECK_THAT(warnings("--label-offset -1"), Contains("different settings (label_offset: -1 and none)"));
   CHECK_THAT(warnings("--bgr"), Contains("different settings (bgr: none and true)"));
-  CHECK_THAT(warnings("--vote geometric"), Contains("vote: \"geometric\" and none"));
+  CHECK_THAT(warnings("--vote geometric"), Contains("vote: \"geometric\" and \"none\""));
   write_text(recording.folder.path() / "settings.yaml", "spread_rest: false\n");
   CHECK_THAT(warnings("--config " + quoted(recording.folder.path() / "settings.yaml")),
              Contains("different settings (spread_rest: false and true)"));

@@ -7,6 +7,7 @@
 #include "io/files/atomic_file.h"
 #include "io/map_file/map_file.h"
 #include "tests/cli/command.h"
+#include "tests/cli/sequences.h"
 #include "tests/support/data.h"
 
 namespace felt::test {
@@ -140,6 +141,33 @@ TEST_CASE("a recorded touch in free space is refused and counted, the others cou
   REQUIRE(touches["refused"].size() == 1);
   CHECK(touches["refused"][0]["line"] == 3);
   CHECK(load_map(out + "/map.vdb").touches.touches.size() == 1);
+}
+
+TEST_CASE("parts without the recording's touches, merged and then touched, are the map of one run") {
+  const TemporaryDirectory folder;
+  const fs::path scene = source_dir() / "data" / "scenes" / "ice_crossing", out = folder.path();
+  const auto map = [&](const char* name, const std::string& options) {
+    REQUIRE(run_feltmap("reconstruct " + quoted(scene) + " --voxel-size 0.05 --quiet --out " + quoted(out / name) +
+                        " " + options)
+                .exit_code == 0);
+    return quoted(out / name / "map.vdb");
+  };
+  const std::string whole = map("whole", ""), merged = quoted(out / "merged.vdb");
+  const std::string parts = map("a", "--no-touches --frames 0:6") + " " + map("b", "--no-touches --frames 6:12");
+  REQUIRE(run_feltmap("merge " + parts + " --out " + merged).exit_code == 0);
+  CHECK(load_map(out / "merged.vdb").touches.touches.empty());
+  REQUIRE(run_feltmap("touch " + merged + " --file " + quoted(scene / "touches.csv") + " --sequence " + quoted(scene))
+              .exit_code == 0);
+  const json same = json::parse(run_feltmap("diff --json " + whole + " " + merged).out);
+  CHECK(same["touches"]["both"] == 3);
+  for (const char* other : {"only_a", "only_b", "regions_changed"}) CHECK(same["touches"][other] == 0);
+  CHECK(same["class_flips"] == 0);
+  for (const auto& [name, channel] : same["channels"].items()) {
+    INFO(name);
+    // Averages, and weights of fractions, are rounded; counts are equal.
+    CHECK(channel["max_difference"] <= (name == "tsdf" ? 1e-6 : name == "weight" ? 1e-4 : name == "color" ? 0.1 : 0));
+    CHECK((channel["voxels_only_a"] == 0 && channel["voxels_only_b"] == 0));
+  }
 }
 
 }  // namespace felt::test

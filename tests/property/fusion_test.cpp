@@ -5,15 +5,18 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <map>
 #include <set>
 
+#include "io/map_file/map_file.h"
 #include "io/simulation/render_sequence.h"
 #include "mapping/fusion/block_allocation.h"
 #include "mapping/fusion/survey_kernels.h"
 #include "mapping/fusion/tsdf_integrator.h"
 #include "mapping/surface/marching_cubes.h"
+#include "tests/support/data.h"
 #include "tests/support/views.h"
 
 using namespace felt;
@@ -419,6 +422,29 @@ TEST_CASE("carving erases what stood before the surface seen later, and nothing 
       CHECK(std::abs(tsdf({0, 0, 55})) < 0.01f);
     // The part of the wall that the ball had hidden is new in both.
     CHECK(map.store.size() >= blocks);
+  }
+}
+
+TEST_CASE("frames that are fused after a load make the map of frames fused without one") {
+  const test::TemporaryDirectory folder;
+  const std::filesystem::path file = folder.path() / "map.vdb";
+  for (int variant = 0; variant < 18; ++variant) {
+    const IntegrationConfig config = some_config(variant);
+    Map through(0.04, 0.16), loaded(0.04, 0.16);
+    IntegrationScratch scratch;
+    Random random(17);
+    for (int n = 0; n < 8; ++n) {
+      // The wall recedes, what stands before it comes and goes, and every third frame has no colours.
+      const double beside = random.between(-1.5, 1.5), wall_z = 1.7 + 0.13 * n;
+      Frame frame = ball_before_wall(jittered_pose(random), 97, 61, 0.3, wall_z, {beside, 0, 1.2});
+      if (n % 3 == 2) frame.color = {};
+      integrate(through, frame, config, scratch);
+      integrate(loaded, frame, config, scratch);
+      save_map(loaded, file);
+      loaded = load_map(file);
+      INFO("variant " << variant << ", frame " << n);
+      REQUIRE(map_hash(loaded) == map_hash(through));
+    }
   }
 }
 

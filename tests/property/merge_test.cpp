@@ -201,6 +201,12 @@ TEST_CASE("frames of the same images with other poses are counted, those of othe
   CHECK(frames_of_same_images(b, a) == 2);
   CHECK(frames_of_same_images(a, a) == 0);  // shared frames, which are refused
   CHECK(shared_frames(a, b).empty());
+  FrameJournal later, other;
+  record_frame(later, images + images, "", 9);
+  record_frame(other, others + others, "", 0);
+  CHECK(of_same_images_elsewhere(a, later));
+  CHECK_FALSE(of_same_images_elsewhere(a, a));
+  CHECK_FALSE(of_same_images_elsewhere(a, other));
 }
 
 TEST_CASE("a property table that continues another merges with it, and where two differ the property is named") {

@@ -177,6 +177,28 @@ TEST_CASE("a mesh written as OBJ is read back to the last bit of its positions")
   CHECK(again.triangles == mesh.triangles);
 }
 
+TEST_CASE("a GLB file keeps every number where its letters make two names one") {
+  const test::TemporaryDirectory folder;
+  TriangleMesh mesh = example();
+  mesh.scalars = {{"friction_mean", {1, 2, 3, 4}}, {"Friction_mean", {5, 6, 7, 8}}, {"friction-mean", {9, 9, 9, 9}}};
+  write_glb(folder.path() / "m.glb", mesh);
+  const std::string bytes = read_whole_file(folder.path() / "m.glb");
+  uint32_t json_size;
+  std::memcpy(&json_size, bytes.data() + 12, 4);
+  const auto document = nlohmann::json::parse(bytes.substr(20, json_size));
+  const auto first_of = [&](const char* attribute) {
+    const auto& attributes = document["meshes"][0]["primitives"][0]["attributes"];
+    const auto& accessor = document["accessors"][attributes.at(attribute).get<size_t>()];
+    const auto& view = document["bufferViews"][accessor["bufferView"].get<size_t>()];
+    float value;
+    std::memcpy(&value, bytes.data() + 28 + json_size + view["byteOffset"].get<size_t>(), 4);
+    return value;
+  };
+  CHECK(first_of("_FRICTION_MEAN") == 1);
+  CHECK(first_of("_FRICTION_MEAN_2") == 5);
+  CHECK(first_of("_FRICTION_MEAN_3") == 9);
+}
+
 TEST_CASE("a GLB file holds the chunks and accessors that its header announces") {
   const test::TemporaryDirectory folder;
   TriangleMesh mesh = example();

@@ -32,6 +32,35 @@ TEST_CASE("undo gives back the map as it was, redo the map as it became") {
   CHECK_THROWS_WITH(undo_touch(map, 1), Catch::Contains("no such id"));
 }
 
+TEST_CASE("touches by two masks at one point are two, in whatever order they come") {
+  const Map map = two_floors(snow, wood, 4);
+  ViewMask whole;
+  whole.camera = {50, 50, 25, 25, 51, 51};
+  whole.mask = Image<uint8_t>(51, 51, 1);
+  whole.T_world_camera.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  whole.T_world_camera.translation() = Eigen::Vector3d(-0.2, 0, 1);
+  ViewMask half = whole, brighter = whole, moved = whole;
+  for (int y = 26; y < 51; ++y)
+    for (int x = 0; x < 51; ++x) half.mask(x, y) = 0;
+  brighter.mask = Image<uint8_t>(51, 51, 255);  // the same pixels
+  moved.T_world_camera.translation().x() = -0.21;
+  CHECK(digest(whole) == digest(brighter));
+  CHECK(digest(whole) != digest(half));
+  CHECK(digest(whole) != digest(moved));
+  TouchRequest request = reading(-0.2, 0, 0.3);
+  request.region.rule = RegionRule::mask;
+  const Touch of_whole = resolve_touch(map, request, &whole), of_half = resolve_touch(map, request, &half);
+  TouchJournal one, other;
+  insert(one, of_whole), insert(one, of_half);
+  insert(other, of_half), insert(other, of_whole);
+  CHECK(journal_digest(one) == journal_digest(other));
+  TouchJournal first, second;
+  insert(first, of_whole), insert(second, of_half);
+  CHECK(journal_digest(joined(first, second)) == journal_digest(one));
+  // Without a mask nothing of it counts.
+  CHECK(resolve_touch(map, reading(-0.2, 0, 0.3), &whole).request.view == 0);
+}
+
 TEST_CASE("joining two journals gives every touch once, whichever comes first") {
   Map map = two_floors(snow, wood, 4);
   TouchJournal left, right;
