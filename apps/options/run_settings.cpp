@@ -31,7 +31,7 @@ std::map<std::string, std::string> settings_as_text(const FusedFrames& run, bool
   constexpr size_t kDigits = 8;
   nlohmann::json settings = settings_of(run);
   if (settings.empty()) return {};
-  if (settings.value("color", true) == false) settings.erase("bgr");
+  if (settings.contains("color") && settings["color"] == false) settings.erase("bgr");
   settings.update(nlohmann::json::parse(json_text(to_json(PerceptionSettings()))));
   if (const nlohmann::json perception = settings.value("perception", nlohmann::json()); perception.is_object())
     settings.update(perception);
@@ -71,13 +71,15 @@ std::vector<std::string> different_settings(std::span<const Map> maps) {
   };
   std::vector<Run> runs;
   std::set<std::string> keys;
-  for (const Map& map : maps)
+  for (const Map& map : maps) {
+    const bool with_labels = has_evidence(map);
     for (const FusedFrames& fused : map.frames.runs) {
-      const auto settings = settings_as_text(fused, has_evidence(map));
+      const auto settings = settings_as_text(fused, with_labels);
       for (const auto& [key, value] : settings)
         if (!of_merge.contains(key) && !of_reading.contains(key)) keys.insert(key);
       if (!settings.empty()) runs.push_back({fused.sequence, settings});
     }
+  }
   std::vector<std::string> different;
   for (const std::string& key : keys) {
     std::map<std::string, std::set<std::string>> values;  // by recording, where that matters

@@ -40,7 +40,7 @@ std::string to_json(const MapDifference& difference, const std::string& a, const
         {"regions_changed", difference.regions_changed},
         {"region_voxels_changed", difference.region_voxels_changed}}}};
   if (!difference.comparable)  // nothing was counted
-    for (const char* key : {"blocks", "channels", "class_flips", "touches", "same_hash"}) report[key] = nullptr;
+    for (const char* key : {"blocks", "channels", "class_flips", "touches"}) report[key] = nullptr;
   return json_text(report, 2);
 }
 
